@@ -1,0 +1,54 @@
+"""Edges of a planning tree, cut into transitions of at most one step."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@njit(cache=True, nogil=True)
+def split_edges(
+    starts: Array, ends: Array, step_size: float
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Cut straight edges into equal transitions no longer than ``step_size``.
+
+    Parameters
+    ----------
+    starts, ends : ndarray of shape (n_edges, d)
+    step_size : float
+
+    Returns
+    -------
+    origins, targets : ndarray of shape (n_transitions, d)
+        In order along each edge; an edge of no length is one transition.
+    edge : ndarray of int of shape (n_transitions,)
+        The edge that each transition belongs to.
+    """
+    n_edges, dim = starts.shape
+    pieces = np.empty(n_edges, np.int64)
+    for e in range(n_edges):
+        squared = 0.0
+        for i in range(dim):
+            squared += (ends[e, i] - starts[e, i]) ** 2
+        # The allowance keeps an edge of exactly m steps from becoming m + 1 by rounding.
+        pieces[e] = max(1, int(np.ceil(np.sqrt(squared) / step_size - 1e-9)))
+    total = pieces.sum()
+    origins = np.empty((total, dim))
+    targets = np.empty((total, dim))
+    edge = np.empty(total, np.int64)
+    row = 0
+    for e in range(n_edges):
+        for piece in range(pieces[e]):
+            edge[row] = e
+            for i in range(dim):
+                length = ends[e, i] - starts[e, i]
+                origins[row, i] = starts[e, i] + length * (piece / pieces[e])
+                if piece + 1 < pieces[e]:
+                    targets[row, i] = starts[e, i] + length * ((piece + 1) / pieces[e])
+                else:
+                    targets[row, i] = ends[e, i]
+            row += 1
+    return origins, targets, edge

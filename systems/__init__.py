@@ -1,0 +1,33 @@
+"""Systems: a robot in one scene, with its reduced model g and its true execution Γ."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from systems.errors import SimulationDivergedError, SystemContractError
+from systems.system import Problem, Rollout, StopReason, System
+
+if TYPE_CHECKING:
+    from systems.check_system import check_system
+    from systems.planar_arm import PlanarArm
+
+__all__ = [
+    "PlanarArm",
+    "Problem",
+    "Rollout",
+    "SimulationDivergedError",
+    "StopReason",
+    "System",
+    "SystemContractError",
+    "check_system",
+]
+
+_HOMES = {"PlanarArm": "systems.planar_arm", "check_system": "systems.check_system"}
+
+
+def __getattr__(name: str) -> Any:
+    # Each system is imported when it is first named, so that one does not pay for the others.
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'systems' has no attribute {name!r}")
