@@ -9,7 +9,7 @@ from systems.errors import SimulationDivergedError, SystemContractError
 from systems.system import Problem, Rollout, StopReason, System
 
 if TYPE_CHECKING:
-    from systems.check_system import check_system
+    from systems.contract_checks import check_system
     from systems.planar_arm import PlanarArm
 
 __all__ = [
@@ -23,7 +23,7 @@ __all__ = [
     "check_system",
 ]
 
-_HOMES = {"PlanarArm": "systems.planar_arm", "check_system": "systems.check_system"}
+_HOMES = {"PlanarArm": "systems.planar_arm", "check_system": "systems.contract_checks"}
 
 
 def __getattr__(name: str) -> Any:
