@@ -1,0 +1,36 @@
+"""Learning which transitions of a reduced model can be trusted."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from reliability.labels import RELIABLE, UNRELIABLE, label_transitions
+from reliability.transitions import Transitions
+
+if TYPE_CHECKING:
+    from reliability.classifier import TransitionReliabilityClassifier
+    from reliability.collect import collect_transitions
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "RELIABLE",
+    "UNRELIABLE",
+    "TransitionReliabilityClassifier",
+    "Transitions",
+    "collect_transitions",
+    "label_transitions",
+]
+
+_HOMES = {
+    "TransitionReliabilityClassifier": "reliability.classifier",
+    "collect_transitions": "reliability.collect",
+}
+
+
+def __getattr__(name: str) -> Any:
+    # scikit-learn and joblib take a second to import, which labelling alone need not pay.
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'reliability' has no attribute {name!r}")

@@ -1,0 +1,427 @@
+"""The transition reliability classifier, a scikit-learn estimator over a neural network."""
+
+from __future__ import annotations
+
+import warnings
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, ClassifierMixin
+from sklearn.model_selection import GroupShuffleSplit, ShuffleSplit
+from sklearn.utils import compute_class_weight
+from sklearn.utils.metaestimators import available_if
+from sklearn.utils.multiclass import type_of_target
+from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
+
+from reliability.mlp_kernel import mlp_logits
+from systems.validation import RandomState, as_generator
+
+FORMAT_VERSION = 1
+LEAKY_SLOPE = np.float32(0.01)
+# Below this many rows, compiled loops beat a tensor library's overhead.
+ROWS_FOR_TORCH = 64
+# What rounding can do to a logit, generously, per unit of the row's largest feature.
+LOGIT_ROUNDING = np.float32(1e-4)
+CERTAIN_LOGIT = 30.0
+STAMPED_PACKAGES = ("numpy", "scikit-learn", "skorch", "torch")
+
+
+def _is_mlp(estimator: TransitionReliabilityClassifier) -> bool:
+    return estimator.backend == "mlp"
+
+
+class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
+    """Predict whether a transition of the reduced model is reliable.
+
+    A binary neural network classifier. Features should be of order one.
+
+    Parameters
+    ----------
+    backend : {"mlp"} or type, default="mlp"
+        "mlp" is the paper's network for the arm: LeakyReLU layers and one logit. A class of torch
+        modules of your own is called with the number of features, and must map float32 rows to
+        one logit each; it must be importable for the fitted classifier to be saved.
+    hidden_layer_sizes : tuple of int, default=(256, 128, 64)
+        Units of the "mlp" backend.
+    max_epochs : int, default=25
+    batch_size : int, default=256
+    learning_rate : float, default=2e-3
+        Initial learning rate of Adam.
+    learning_rate_decay : float, default=0.87
+        Factor by which the learning rate is multiplied every ``epochs_per_decay`` epochs.
+    epochs_per_decay : int, default=1
+    validation_fraction : float, default=0.2
+        Share of the data that is held out: whole groups if ``fit`` is given groups, single rows
+        if not.
+    patience : int, default=None
+        Stop when the held-out loss has not improved for so many epochs, and keep the best epoch's
+        weights. None trains for ``max_epochs``.
+    class_weight : dict, "balanced" or None, default=None
+        Weights of the classes in the loss, as in scikit-learn.
+    balanced_batches : bool, default=False
+        Draw training batches with replacement so that both classes are equally likely.
+    device : str, default="cpu"
+        Torch device to train and predict on.
+    random_state : int, Generator, RandomState or None, default=None
+        Reproduces the split and the training; global generators are left alone.
+    verbose : int, default=0
+        1 shows a progress bar during ``fit``.
+
+    Attributes
+    ----------
+    classes_ : ndarray of shape (n_classes,)
+    n_features_in_ : int
+    feature_names_in_ : ndarray of str
+        Only if X had string column names.
+    validation_accuracy_ : float
+        Accuracy on the held-out part: the planner's p_acc. NaN if nothing was held out.
+    history_ : list of dict
+        Per epoch: ``train_loss``, ``valid_loss``, ``valid_accuracy``.
+
+    Notes
+    -----
+    A joblib file holds the weights as arrays and no training state, so that it loads on a machine
+    without the training device. Like any pickle, load only files that you trust.
+
+    References
+    ----------
+    McConachie et al. 2020, "Learning Transition Reliability".
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from reliability import TransitionReliabilityClassifier
+    >>> X = np.random.default_rng(0).normal(size=(400, 3))
+    >>> y = (X[:, 0] > 0).astype(int)
+    >>> clf = TransitionReliabilityClassifier(random_state=0).fit(X, y)
+    >>> clf.predict([[2.0, 0.0, 0.0], [-2.0, 0.0, 0.0]])
+    array([1, 0])
+    """
+
+    def __init__(
+        self,
+        backend: str | type = "mlp",
+        *,
+        hidden_layer_sizes: tuple[int, ...] = (256, 128, 64),
+        max_epochs: int = 25,
+        batch_size: int = 256,
+        learning_rate: float = 2e-3,
+        learning_rate_decay: float = 0.87,
+        epochs_per_decay: int = 1,
+        validation_fraction: float = 0.2,
+        patience: int | None = None,
+        class_weight: dict[Any, float] | str | None = None,
+        balanced_batches: bool = False,
+        device: str = "cpu",
+        random_state: RandomState = None,
+        verbose: int = 0,
+    ) -> None:
+        self.backend = backend
+        self.hidden_layer_sizes = hidden_layer_sizes
+        self.max_epochs = max_epochs
+        self.batch_size = batch_size
+        self.learning_rate = learning_rate
+        self.learning_rate_decay = learning_rate_decay
+        self.epochs_per_decay = epochs_per_decay
+        self.validation_fraction = validation_fraction
+        self.patience = patience
+        self.class_weight = class_weight
+        self.balanced_batches = balanced_batches
+        self.device = device
+        self.random_state = random_state
+        self.verbose = verbose
+
+    def __sklearn_tags__(self) -> Any:
+        """Tell scikit-learn that this is a binary classifier."""
+        tags = super().__sklearn_tags__()
+        tags.classifier_tags.multi_class = False
+        return tags
+
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        groups: ArrayLike | None = None,
+        sample_weight: ArrayLike | None = None,
+    ) -> TransitionReliabilityClassifier:
+        """Train on labelled transitions.
+
+        Parameters
+        ----------
+        X : array-like of shape (n, n_features)
+        y : array-like of shape (n,)
+            One or two labels; with one, that label is predicted ever after.
+        groups : array-like of shape (n,), default=None
+            Plan ids. The held-out part is then made of whole plans.
+        sample_weight : array-like of shape (n,), default=None
+
+        Returns
+        -------
+        self : TransitionReliabilityClassifier
+
+        Raises
+        ------
+        ValueError
+            If a parameter or the data are unfit.
+        FloatingPointError
+            If training diverges.
+        """
+        self._check_parameters()
+        X, y = validate_data(self, X, y, dtype=np.float32)
+        self.classes_, target = _encode(y)
+        weight = self._row_weights(y, sample_weight)
+        rng = as_generator(self.random_state)
+        training, held_out = self._split(len(X), groups, rng)
+        used = training[weight[training] > 0]
+        if len(used) == 0:
+            raise ValueError("sample_weight must be positive for some training row, got zeros.")
+        self.history_: list[dict[str, float]] = []
+        self._state: dict[str, NDArray[np.float32]] | None = None
+        self._forget_module()
+        self._constant = _constant_logit(target[used], len(self.classes_))
+        if self._constant is None:
+            self._train(X, target, weight, used, held_out, int(rng.integers(2**31)))
+        else:
+            warnings.warn(
+                "The training rows are all of one class, which will always be predicted.",
+                stacklevel=2,
+            )
+        self._format_version = FORMAT_VERSION
+        self._package_versions = {name: version(name) for name in STAMPED_PACKAGES}
+        truth = self.classes_[target[held_out]]
+        self.validation_accuracy_ = (
+            float(np.mean(self.predict(X[held_out]) == truth)) if len(held_out) else float("nan")
+        )
+        return self
+
+    def decision_function(self, X: ArrayLike) -> NDArray[np.float32]:
+        """Return the logit of the second class for each row of X.
+
+        Parameters
+        ----------
+        X : array-like of shape (n, n_features)
+
+        Returns
+        -------
+        decision : ndarray of shape (n,)
+            Positive where ``classes_[1]`` is predicted.
+        """
+        check_is_fitted(self)
+        X = validate_data(self, X, dtype=np.float32, reset=False)
+        if self._constant is not None:
+            return np.full(len(X), self._constant, dtype=np.float32)
+        if not _is_mlp(self):
+            return self._torch_logits(X)
+        if len(X) < ROWS_FOR_TORCH:
+            return self._kernel_logits(X)
+        decision = self._torch_logits(X)
+        # Rounding must not decide: near the boundary planners and predict ask the same kernel.
+        largest = 1 + np.abs(X).max(axis=1)
+        doubtful = np.abs(decision) < LOGIT_ROUNDING * largest
+        decision[doubtful] = self._kernel_logits(X[doubtful])
+        return decision
+
+    @available_if(_is_mlp)
+    def fast_decision_function(self, X: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+        """Return :meth:`decision_function` of rows that are known to be sound.
+
+        For planners, which ask for a few transitions at a time and a hundred thousand times:
+        nothing is validated. The sign is the same as that of :meth:`decision_function`.
+
+        Parameters
+        ----------
+        X : ndarray of float of shape (n, n_features)
+        """
+        if self._constant is not None:
+            return np.full(len(X), self._constant, dtype=np.float32)
+        return self._kernel_logits(X)
+
+    def predict_proba(self, X: ArrayLike) -> NDArray[np.float64]:
+        """Return the probability of each class for each row of X.
+
+        Parameters
+        ----------
+        X : array-like of shape (n, n_features)
+
+        Returns
+        -------
+        probabilities : ndarray of shape (n, n_classes)
+            Columns as in ``classes_``.
+        """
+        decision = self.decision_function(X).astype(np.float64)
+        if len(self.classes_) == 1:
+            return np.ones((len(decision), 1))
+        second = np.exp(-np.logaddexp(0.0, -decision))
+        return np.column_stack([1 - second, second])
+
+    def predict(self, X: ArrayLike) -> NDArray[Any]:
+        """Return the more likely label for each row of X.
+
+        Parameters
+        ----------
+        X : array-like of shape (n, n_features)
+
+        Returns
+        -------
+        y : ndarray of shape (n,)
+        """
+        decision = self.decision_function(X)
+        return self.classes_[(decision > 0).astype(np.intp)]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what is rebuilt from the weights."""
+        state = dict(super().__getstate__())
+        state.pop("_module", None)
+        state.pop("_layers", None)
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Refuse the state of another format."""
+        found = state.get("_format_version", FORMAT_VERSION)
+        if found != FORMAT_VERSION:
+            raise ValueError(
+                f"This classifier was saved in format {found} with {state['_package_versions']}; "
+                f"this version of transition-reliability reads format {FORMAT_VERSION}. Load it "
+                "with the version that saved it, or train it again."
+            )
+        super().__setstate__(state)
+
+    def _train(
+        self,
+        X: NDArray[np.float32],
+        target: NDArray[np.intp],
+        weight: NDArray[np.float64],
+        training: NDArray[np.intp],
+        held_out: NDArray[np.intp],
+        seed: int,
+    ) -> None:
+        from reliability import networks
+
+        def data(rows: NDArray[np.intp]) -> networks.TrainingData:
+            return networks.TrainingData(
+                X[rows], target[rows].astype(np.float32), weight[rows].astype(np.float32)
+            )
+
+        plan = networks.TrainingPlan(
+            max_epochs=self.max_epochs,
+            batch_size=self.batch_size,
+            learning_rate=self.learning_rate,
+            learning_rate_decay=self.learning_rate_decay,
+            epochs_per_decay=self.epochs_per_decay,
+            patience=self.patience if len(held_out) else None,
+            balanced_batches=self.balanced_batches,
+            device=self.device,
+            verbose=self.verbose,
+        )
+        self._state, self.history_ = networks.train(
+            *self._architecture(),
+            data(training),
+            data(held_out) if len(held_out) else None,
+            plan,
+            seed,
+        )
+
+    def _architecture(self) -> tuple[Any, dict[str, Any]]:
+        from reliability import networks
+
+        if _is_mlp(self):
+            sizes = tuple(self.hidden_layer_sizes)
+            return networks.MLP, {"n_features": self.n_features_in_, "hidden_layer_sizes": sizes}
+        return self.backend, {"n_features": self.n_features_in_}
+
+    def _torch_logits(self, X: NDArray[np.float32]) -> NDArray[np.float32]:
+        from reliability import networks
+
+        if not hasattr(self, "_module"):
+            module = networks.restore(*self._architecture(), self._state, self.device)
+            self._module = module
+        with networks.one_thread():
+            return networks.logits(self._module, X, self.device)
+
+    def _kernel_logits(self, X: NDArray[Any]) -> NDArray[np.float32]:
+        if not hasattr(self, "_layers"):
+            arrays = list(self._state.values())
+            # Copies: the arrays of a memory-mapped file are read-only, another type to numba.
+            weights = tuple(np.array(array.T, order="C") for array in arrays[0::2])
+            self._layers = weights, tuple(np.array(array) for array in arrays[1::2])
+        rows = np.array(X, dtype=np.float32, order="C")
+        return mlp_logits(rows, *self._layers, LEAKY_SLOPE)
+
+    def _forget_module(self) -> None:
+        vars(self).pop("_module", None)
+        vars(self).pop("_layers", None)
+
+    def _row_weights(self, y: NDArray[Any], sample_weight: ArrayLike | None) -> NDArray[np.float64]:
+        weight = np.ones(len(y))
+        if sample_weight is not None:
+            weight = np.asarray(sample_weight, dtype=np.float64).copy()
+            if weight.shape != (len(y),) or not (np.isfinite(weight) & (weight >= 0)).all():
+                raise ValueError(
+                    f"sample_weight must hold {len(y)} finite weights that are not negative, "
+                    f"got the shape {weight.shape}."
+                )
+        if self.class_weight is not None:
+            per_class = compute_class_weight(self.class_weight, classes=self.classes_, y=y)
+            weight *= per_class[np.searchsorted(self.classes_, y)]
+        return weight
+
+    def _split(
+        self, n_rows: int, groups: ArrayLike | None, rng: np.random.Generator
+    ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        seed = int(rng.integers(2**31))
+        units: Any = np.arange(n_rows)
+        if groups is not None:
+            check_consistent_length(np.zeros(n_rows), groups)
+            units = np.unique(np.asarray(groups))
+        n_held_out = min(round(self.validation_fraction * len(units)), len(units) - 1)
+        if n_held_out < 1:
+            return np.arange(n_rows), np.arange(0)
+        splitter = ShuffleSplit if groups is None else GroupShuffleSplit
+        split = splitter(1, test_size=n_held_out, random_state=seed)
+        return next(split.split(np.zeros(n_rows), groups=groups))
+
+    def _check_parameters(self) -> None:
+        if self.backend != "mlp" and not isinstance(self.backend, type):
+            raise ValueError(
+                f'backend must be "mlp" or a class of torch modules, got {self.backend!r}.'
+            )
+        sizes = self.hidden_layer_sizes
+        if not isinstance(sizes, tuple | list) or not all(_is_count(size) for size in sizes):
+            raise ValueError(f"hidden_layer_sizes must be positive integers, got {sizes!r}.")
+        for name in ("max_epochs", "batch_size", "epochs_per_decay"):
+            if not _is_count(getattr(self, name)):
+                raise ValueError(f"{name} must be a positive integer, got {getattr(self, name)!r}.")
+        if self.patience is not None and not _is_count(self.patience):
+            raise ValueError(f"patience must be None or a positive integer, got {self.patience!r}.")
+        limits = {
+            "learning_rate": (0, np.inf),
+            "learning_rate_decay": (0, 1),
+            "validation_fraction": (0, 1),
+        }
+        for name, (low, high) in limits.items():
+            value = getattr(self, name)
+            number = isinstance(value, int | float | np.floating) and not isinstance(value, bool)
+            if not number or not low <= value <= high:
+                raise ValueError(f"{name} must be between {low} and {high}, got {value!r}.")
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and value > 0
+
+
+def _encode(y: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.intp]]:
+    kind = type_of_target(y, input_name="y", raise_unknown=True)
+    if kind != "binary":
+        raise ValueError(
+            f"Only binary classification is supported. The type of the target is {kind}."
+        )
+    return np.unique(y, return_inverse=True)
+
+
+def _constant_logit(target: NDArray[np.intp], n_classes: int) -> float | None:
+    present = np.unique(target)
+    if len(present) > 1:
+        return None
+    return CERTAIN_LOGIT if n_classes > 1 and present[0] == 1 else -CERTAIN_LOGIT
