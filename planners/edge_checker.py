@@ -1,0 +1,75 @@
+"""Checking straight edges: g and CheckTransition, transition by transition."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.check_transition import CheckTransition
+from planners.edges import split_edges
+from systems.system import Array, System
+
+
+class EdgeChecker:
+    """Decides about straight edges of a system whose reduced state is only a configuration.
+
+    Parameters
+    ----------
+    system : System
+    check : CheckTransition
+
+    Attributes
+    ----------
+    accepted_edges : list of tuple of ndarray
+        Edges that :meth:`accept` let pass, in the direction in which they were asked about.
+    """
+
+    def __init__(self, system: System, check: CheckTransition) -> None:
+        self._system = system
+        self._check = check
+        self.accepted_edges: list[tuple[Array, Array]] = []
+
+    def accept(self, starts: Array, ends: Array) -> NDArray[np.bool_]:
+        """Accept edges of which g allows and CheckTransition accepts every transition.
+
+        Parameters
+        ----------
+        starts, ends : ndarray of shape (n_edges, configuration_dim)
+            To be executed from start to end.
+
+        Returns
+        -------
+        accepted : ndarray of bool of shape (n_edges,)
+        """
+        possible, origins, following, edge = self._propagate(starts, ends)
+        accepted = _all_per_edge(possible, edge, self._check(origins, following))
+        for i in np.flatnonzero(accepted):
+            self.accepted_edges.append((starts[i], ends[i]))
+        return accepted
+
+    def reliable(self, starts: Array, ends: Array) -> NDArray[np.bool_]:
+        """Accept edges of which every transition is classified Reliable, with no draws."""
+        possible, origins, following, edge = self._propagate(starts, ends)
+        return _all_per_edge(possible, edge, self._check.classify(origins, following))
+
+    def _propagate(
+        self, starts: Array, ends: Array
+    ) -> tuple[NDArray[np.bool_], Array, Array, NDArray[np.int64]]:
+        """Return which edges g allows, and those edges' transitions."""
+        origins, targets, edge = split_edges(starts, ends, self._system.step_size)
+        command = self._system.steer(origins, targets)
+        following, valid = self._system.propagate(origins, command)
+        possible = np.ones(len(starts), dtype=np.bool_)
+        if not valid.all():
+            possible[edge[~valid]] = False
+            kept = possible[edge]
+            origins, following, edge = origins[kept], following[kept], edge[kept]
+        return possible, origins, following, edge
+
+
+def _all_per_edge(
+    possible: NDArray[np.bool_], edge: NDArray[np.int64], accepted: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    result = possible.copy()
+    result[edge[~accepted]] = False
+    return result

@@ -1,0 +1,116 @@
+"""What a planner returns."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from dataclasses import dataclass, fields
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FORMAT_VERSION = 1
+Array = NDArray[np.float64]
+
+
+class PlanStatus(Enum):
+    """How planning ended; each value says what to do about it."""
+
+    SOLVED = "The plan reaches the goal."
+    ITERATION_LIMIT = (
+        "No plan was found within max_iterations. Raise max_iterations, or lower k so that more "
+        "Unreliable transitions are accepted."
+    )
+    TIME_LIMIT = (
+        "No plan was found within time_limit. Raise time_limit, or lower k so that more "
+        "Unreliable transitions are accepted."
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class PlanResult:
+    """A plan, or why there is none, and what it took.
+
+    Attributes
+    ----------
+    reduced : ndarray of shape (T + 1, reduced_dim)
+        Reduced states, the start first; the start alone without a plan.
+    commands : ndarray of shape (T, command_dim)
+    status : PlanStatus
+    reliability : ndarray of shape (T,) or None
+        Probability that each transition is Reliable; 1 or 0 from an estimator that only
+        predicts, None without an estimator.
+    planning_time, simplification_time : float
+        Seconds.
+    n_checked : int
+        Transitions that the estimator was asked about, in the search and in simplification.
+    n_rejected : int
+        Unreliable transitions that were not accepted.
+    n_accepted_unreliable : int
+        Unreliable transitions that were accepted by a draw.
+    tree : ndarray of shape (n_edges, 2, reduced_dim)
+        Accepted edges, in the direction of execution.
+    random_state : int
+        Seed that gives this result again.
+    """
+
+    reduced: Array
+    commands: Array
+    status: PlanStatus
+    reliability: Array | None
+    planning_time: float
+    simplification_time: float
+    n_checked: int
+    n_rejected: int
+    n_accepted_unreliable: int
+    tree: Array
+    random_state: int
+
+    @property
+    def success(self) -> bool:
+        """Whether the plan reaches the goal; False for anything short of it."""
+        return self.status is PlanStatus.SOLVED
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write one npz file."""
+        target = Path(path)
+        partial = target.with_name(target.name + ".partial")
+        values: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        values["status"] = self.status.name
+        if self.reliability is None:
+            del values["reliability"]
+        with partial.open("wb") as file:
+            np.savez(file, format_version=np.array(FORMAT_VERSION), **values)
+        os.replace(partial, target)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> PlanResult:
+        """Read a file that :meth:`save` wrote.
+
+        Raises
+        ------
+        ValueError
+            If the file is no such file, is truncated, or has another format version.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                version = int(archive["format_version"])
+                if version != FORMAT_VERSION:
+                    raise ValueError(
+                        f"{path} has the format version {version} and this library reads "
+                        f"{FORMAT_VERSION}; plan again, or load it with the version of the "
+                        "library that wrote it."
+                    )
+                values = {name: archive[name] for name in archive.files}
+        except FileNotFoundError:
+            raise
+        except (zipfile.BadZipFile, KeyError, EOFError, OSError, AttributeError) as error:
+            raise ValueError(f"{path} is not a whole file of a plan ({error}).") from error
+        del values["format_version"]
+        arrays = ("reduced", "commands", "reliability", "tree")
+        values = {k: v if k in arrays else v.item() for k, v in values.items()}
+        values["status"] = PlanStatus[values["status"]]
+        return cls(**{"reliability": None} | values)

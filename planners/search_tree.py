@@ -1,0 +1,100 @@
+"""The tree of a sampling-based search."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class SearchTree:
+    """Reduced states with their parents and the commands that led to them.
+
+    Parameters
+    ----------
+    roots : ndarray of shape (n_roots, reduced_dim)
+    configuration_dim : int
+        Leading entries of a reduced state that distances are measured in.
+    """
+
+    def __init__(self, roots: Array, configuration_dim: int) -> None:
+        self._dim = configuration_dim
+        self._reduced = np.array(roots)
+        self._parents = np.full(len(roots), -1)
+        self._size = len(roots)
+
+    @property
+    def reduced(self) -> Array:
+        """Reduced states, shape (n, reduced_dim)."""
+        return self._reduced[: self._size]
+
+    @property
+    def parents(self) -> NDArray[np.int64]:
+        """Index of each state's parent, -1 for roots; shape (n,)."""
+        return self._parents[: self._size]
+
+    def add(self, reduced: Array, parents: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Add states, shape (m, reduced_dim), and return their indices."""
+        new_size = self._size + len(reduced)
+        if new_size > len(self._reduced):
+            capacity = max(2 * len(self._reduced), new_size, 256)
+            self._reduced = _grown(self._reduced, capacity)
+            self._parents = _grown(self._parents, capacity)
+        added = np.arange(self._size, new_size)
+        self._reduced[added] = reduced
+        self._parents[added] = parents
+        self._size = new_size
+        return added
+
+    def nearest(self, configurations: Array) -> NDArray[np.int64]:
+        """Return the index of the state nearest to each configuration, (m, configuration_dim)."""
+        return nearest_rows(self._reduced, self._size, self._dim, configurations)
+
+    def branch(self, index: int) -> NDArray[np.int64]:
+        """Return the indices from a root to a state."""
+        indices = []
+        while index >= 0:
+            indices.append(index)
+            index = int(self._parents[index])
+        return np.array(indices[::-1])
+
+    def edges(self) -> Array:
+        """Return (parent, child) pairs of reduced states, shape (n_edges, 2, reduced_dim)."""
+        children = np.flatnonzero(self.parents >= 0)
+        return np.stack([self.reduced[self.parents[children]], self.reduced[children]], axis=1)
+
+
+@njit(cache=True, nogil=True)
+def nearest_rows(rows: Array, n_rows: int, dim: int, queries: Array) -> NDArray[np.int64]:
+    """Return, for each query, the first row at the smallest Euclidean distance.
+
+    Parameters
+    ----------
+    rows : ndarray of shape (capacity, at least dim)
+        Only the first ``n_rows`` rows and ``dim`` columns count.
+    n_rows, dim : int
+    queries : ndarray of shape (m, dim)
+
+    Returns
+    -------
+    nearest : ndarray of int of shape (m,)
+    """
+    nearest = np.empty(queries.shape[0], np.int64)
+    for query in range(queries.shape[0]):
+        smallest = np.inf
+        for row in range(n_rows):
+            squared = 0.0
+            for i in range(dim):
+                squared += (rows[row, i] - queries[query, i]) ** 2
+            if squared < smallest:
+                smallest = squared
+                nearest[query] = row
+    return nearest
+
+
+def _grown(array: NDArray[np.generic], capacity: int) -> NDArray[np.generic]:
+    grown = np.empty((capacity, *array.shape[1:]), dtype=array.dtype)
+    grown[: len(array)] = array
+    return grown

@@ -1,0 +1,60 @@
+"""Shortcuts that keep a plan as reliable as it was found."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planners.edge_checker import EdgeChecker
+from planners.edges import split_edges
+from systems.system import Array
+
+ROUNDS = 12
+PROPOSALS_PER_ROUND = 8
+SMALLEST_SAVING = 1e-6
+
+
+def shorten(path: Array, checker: EdgeChecker, step_size: float, rng: np.random.Generator) -> Array:
+    """Replace parts of a path by straight lines that are Reliable all along.
+
+    A shortcut is classified in the direction in which it will be executed and nothing is drawn,
+    so that every transition of the result was either accepted in the search or is classified
+    Reliable. (A shortcut that is tried again and again until a draw lets it pass would undo the
+    bias.)
+
+    Parameters
+    ----------
+    path : ndarray of shape (T + 1, configuration_dim)
+        One state per transition.
+    checker : EdgeChecker
+    step_size : float
+    rng : Generator
+
+    Returns
+    -------
+    shortened : ndarray of shape (S + 1, configuration_dim), S <= T
+    """
+    for _ in range(ROUNDS):
+        if len(path) <= 2:
+            break
+        first, last, saving = _propose(path, rng)
+        if len(first) == 0:
+            continue
+        saving[~checker.reliable(path[first], path[last])] = 0
+        best = int(np.argmax(saving))
+        if saving[best] > 0:
+            start, end = first[best], last[best]
+            _, straight, _ = split_edges(path[start][None], path[end][None], step_size)
+            path = np.concatenate([path[: start + 1], straight, path[end + 1 :]])
+    return path
+
+
+def _propose(path: Array, rng: np.random.Generator) -> tuple[Array, Array, Array]:
+    """Draw pairs of states with a detour between them, and the length that each would save."""
+    pairs = np.sort(rng.integers(len(path), size=(PROPOSALS_PER_ROUND, 2)), axis=1)
+    pairs[0] = 0, len(path) - 1
+    first, last = pairs.T
+    lengths = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    travelled = np.concatenate([[0.0], np.cumsum(lengths)])
+    saving = travelled[last] - travelled[first] - np.linalg.norm(path[last] - path[first], axis=1)
+    worthwhile = saving > SMALLEST_SAVING
+    return first[worthwhile], last[worthwhile], saving[worthwhile]
