@@ -17,17 +17,12 @@ class EdgeChecker:
     ----------
     system : System
     check : CheckTransition
-
-    Attributes
-    ----------
-    accepted_edges : list of tuple of ndarray
-        Edges that :meth:`accept` let pass, in the direction in which they were asked about.
     """
 
     def __init__(self, system: System, check: CheckTransition) -> None:
         self._system = system
         self._check = check
-        self.accepted_edges: list[tuple[Array, Array]] = []
+        self._accepted: list[tuple[Array, Array, NDArray[np.bool_]]] = []
 
     def accept(self, starts: Array, ends: Array) -> NDArray[np.bool_]:
         """Accept edges of which g allows and CheckTransition accepts every transition.
@@ -43,9 +38,14 @@ class EdgeChecker:
         """
         possible, origins, following, edge = self._propagate(starts, ends)
         accepted = _all_per_edge(possible, edge, self._check(origins, following))
-        for i in np.flatnonzero(accepted):
-            self.accepted_edges.append((starts[i], ends[i]))
+        if accepted.any():
+            self._accepted.append((starts, ends, accepted))
         return accepted
+
+    def accepted_edges(self) -> Array:
+        """Return all edges that :meth:`accept` let pass, shape (n, 2, configuration_dim)."""
+        edges = [np.stack([starts[a], ends[a]], axis=1) for starts, ends, a in self._accepted]
+        return np.concatenate([np.empty((0, 2, self._system.reduced_dim)), *edges])
 
     def reliable(self, starts: Array, ends: Array) -> NDArray[np.bool_]:
         """Accept edges of which every transition is classified Reliable, with no draws."""
@@ -70,6 +70,6 @@ class EdgeChecker:
 def _all_per_edge(
     possible: NDArray[np.bool_], edge: NDArray[np.int64], accepted: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    result = possible.copy()
-    result[edge[~accepted]] = False
-    return result
+    if not accepted.all():
+        possible[edge[~accepted]] = False
+    return possible

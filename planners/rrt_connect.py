@@ -111,7 +111,7 @@ class BiasedRRTConnect(BiasedPlanner):
             status=status,
             reduced=path,
             commands=self.system.steer(path[:-1], path[1:]),
-            tree=np.reshape(checker.accepted_edges, (-1, 2, self.system.reduced_dim)),
+            tree=checker.accepted_edges(),
             simplification_time=simplification_time,
         )
 

@@ -20,8 +20,8 @@ from systems.validation import RandomState, as_generator
 
 FORMAT_VERSION = 1
 LEAKY_SLOPE = np.float32(0.01)
-# Below this many rows, compiled loops beat a tensor library's overhead.
-ROWS_FOR_TORCH = 64
+# Below this many rows, importing a tensor library costs more than it saves.
+ROWS_FOR_TORCH = 2048
 # What rounding can do to a logit, generously, per unit of the row's largest feature.
 LOGIT_ROUNDING = np.float32(1e-4)
 CERTAIN_LOGIT = 30.0
@@ -274,7 +274,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         """Leave out what is rebuilt from the weights."""
         state = dict(super().__getstate__())
         state.pop("_module", None)
-        state.pop("_layers", None)
+        state.pop("_flat", None)
         return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -341,17 +341,14 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
             return networks.logits(self._module, X, self.device)
 
     def _kernel_logits(self, X: NDArray[Any]) -> NDArray[np.float32]:
-        if not hasattr(self, "_layers"):
-            arrays = list(self._state.values())
-            # Copies: the arrays of a memory-mapped file are read-only, another type to numba.
-            weights = tuple(np.array(array.T, order="C") for array in arrays[0::2])
-            self._layers = weights, tuple(np.array(array) for array in arrays[1::2])
+        if not hasattr(self, "_flat"):
+            self._flat = _flattened(list(self._state.values()))
         rows = np.array(X, dtype=np.float32, order="C")
-        return mlp_logits(rows, *self._layers, LEAKY_SLOPE)
+        return mlp_logits(rows, *self._flat, LEAKY_SLOPE)
 
     def _forget_module(self) -> None:
         vars(self).pop("_module", None)
-        vars(self).pop("_layers", None)
+        vars(self).pop("_flat", None)
 
     def _row_weights(self, y: NDArray[Any], sample_weight: ArrayLike | None) -> NDArray[np.float64]:
         weight = np.ones(len(y))
@@ -425,3 +422,13 @@ def _constant_logit(target: NDArray[np.intp], n_classes: int) -> float | None:
     if len(present) > 1:
         return None
     return CERTAIN_LOGIT if n_classes > 1 and present[0] == 1 else -CERTAIN_LOGIT
+
+
+def _flattened(
+    arrays: list[NDArray[np.float32]],
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Lay out weights and biases, as torch orders them, for the compiled forward pass."""
+    weights, biases = arrays[0::2], arrays[1::2]
+    sizes = np.array([weights[0].shape[1], *(len(bias) for bias in biases)])
+    layers = zip(weights, biases, strict=True)
+    return sizes, np.concatenate([part.ravel() for w, b in layers for part in (w.T, b)])

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reliability.labels import RELIABLE, UNRELIABLE
 from systems.system import System
 
 FORMAT_VERSION = 1
@@ -86,6 +87,20 @@ class Transitions:
         X : ndarray of shape (n, n_features)
         """
         return system.features(self.reduced, self.next_reduced)
+
+    def first_mistakes(self) -> NDArray[np.bool_]:
+        """Tell where execution and prediction part, from where they had already parted.
+
+        Returns
+        -------
+        mask : ndarray of bool of shape (n,)
+            Unreliable transitions that follow a Reliable one or begin their plan.
+        """
+        follows = np.zeros(len(self), dtype=np.bool_)
+        follows[1:] = (self.plan[1:] == self.plan[:-1]) & (self.step[1:] == self.step[:-1] + 1)
+        was_reliable = np.ones(len(self), dtype=np.bool_)
+        was_reliable[1:] = ~follows[1:] | (self.y[:-1] == RELIABLE)
+        return (self.y == UNRELIABLE) & was_reliable
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file; whatever stood there is replaced only when all is written."""

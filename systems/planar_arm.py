@@ -60,12 +60,12 @@ class PlanarArm(System):
 
     def propagate(self, reduced: Array, command: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Predict that the arm gets to where it is commanded: g."""
-        _check_rows(reduced=reduced, command=command)
+        _check_rows(reduced, command)
         return command.copy(), np.ones(len(command), dtype=np.bool_)
 
     def steer(self, reduced: Array, configuration: Array) -> Array:
         """Return the configuration within one step that lies towards ``configuration``."""
-        _check_rows(reduced=reduced, configuration=configuration)
+        _check_rows(reduced, configuration)
         return limited_targets(reduced, configuration, self.step_size)
 
     def rollout(self, state: Any, commands: ArrayLike) -> Rollout:
@@ -101,12 +101,12 @@ class PlanarArm(System):
 
     def close(self, predicted: Array, executed: Array) -> NDArray[np.bool_]:
         """Say whether configurations are less than α = 0.075 rad apart: Close."""
-        _check_rows(predicted=predicted, executed=executed)
+        _check_rows(predicted, executed)
         return np.linalg.norm(predicted - executed, axis=1) < CLOSE_DISTANCE
 
     def features(self, reduced: Array, next_reduced: Array) -> Array:
         """Return (n, 12) rows: joint angles, directions of the links, and the motion in steps."""
-        _check_rows(reduced=reduced, next_reduced=next_reduced)
+        _check_rows(reduced, next_reduced)
         return transition_features(reduced, next_reduced, self.step_size)
 
     def sample_problem(self, random_state: RandomState = None) -> Problem:
@@ -205,14 +205,14 @@ class PlanarArm(System):
         positions : ndarray of shape (n, 4, 2)
             x and z, in metres, with the base at the origin.
         """
-        _check_rows(configurations=configurations)
+        _check_rows(configurations)
         angles = np.cumsum(configurations, axis=1)
         links = LINK_LENGTH * np.stack([np.cos(angles), np.sin(angles)], axis=2)
         return np.concatenate([np.zeros((len(links), 1, 2)), np.cumsum(links, axis=1)], axis=1)
 
     def goal_reached(self, reduced: Array, goal: Array) -> NDArray[np.bool_]:
         """Say, row by row, whether a configuration is one of the goal's: Goal_B."""
-        _check_rows(reduced=reduced, goal=goal)
+        _check_rows(reduced, goal)
         distances = np.linalg.norm(reduced[:, None] - goal[None], axis=2)
         return (distances < GOAL_DISTANCE).any(axis=1)
 
@@ -273,7 +273,10 @@ class _Simulation:
         return np.array(data.qpos)
 
 
-def _check_rows(**arrays: Array) -> None:
-    for name, array in arrays.items():
-        if np.ndim(array) != 2 or np.shape(array)[1] != 3:
-            raise ValueError(f"{name} must have the shape (n, 3), got {np.shape(array)}.")
+def _check_rows(*arrays: Array) -> None:
+    for array in arrays:
+        if getattr(array, "ndim", 0) != 2 or array.shape[1] != 3:
+            raise ValueError(
+                "Configurations must be rows of three joint angles, an array of shape (n, 3), "
+                f"got {np.shape(array)}."
+            )
