@@ -16,6 +16,7 @@ from sklearn.utils.multiclass import type_of_target
 from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
 
 from reliability.mlp_kernel import mlp_logits
+from reliability.persistence import ModelFileError
 from systems.validation import RandomState, as_generator
 
 FORMAT_VERSION = 1
@@ -281,7 +282,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         """Refuse the state of another format."""
         found = state.get("_format_version", FORMAT_VERSION)
         if found != FORMAT_VERSION:
-            raise ValueError(
+            raise ModelFileError(
                 f"This classifier was saved in format {found} with {state['_package_versions']}; "
                 f"this version of transition-reliability reads format {FORMAT_VERSION}. Load it "
                 "with the version that saved it, or train it again."
