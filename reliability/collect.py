@@ -224,12 +224,12 @@ class _ShardFolder:
             description = description | {"random_state": found.get("random_state")}
         differing = [key for key in description if found.get(key) != description[key]]
         if differing:
+            changes = "; ".join(
+                f"{key}: {found.get(key)} then, {description[key]} now" for key in differing
+            )
             raise ValueError(
-                f"path {self._folder} holds data collected with other arguments: "
-                + "; ".join(
-                    f"{key} was {found.get(key)}, is {description[key]}" for key in differing
-                )
-                + ". Choose another path, or remove this one."
+                f"path {self._folder} holds data collected with other arguments ({changes}); "
+                "choose another path, or remove this one."
             )
         return int(found["random_state"])
 
