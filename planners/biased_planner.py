@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
 from planners.check_transition import CheckTransition
@@ -120,7 +120,7 @@ class BiasedPlanner(BaseEstimator):
             reduced=found.reduced,
             commands=found.commands,
             status=found.status,
-            reliability=check.probability(found.reduced[:-1], found.reduced[1:]),
+            reliability=self._reliability(found, check),
             planning_time=duration - found.simplification_time,
             simplification_time=found.simplification_time,
             n_checked=check.n_checked,
@@ -129,6 +129,11 @@ class BiasedPlanner(BaseEstimator):
             tree=found.tree,
             random_state=seed,
         )
+
+    def _reliability(self, found: Found, check: CheckTransition) -> Array | None:
+        if self.estimator is None:
+            return None
+        return check.probability(found.reduced[:-1], found.reduced[1:])
 
     def _check_parameters(self) -> None:
         if not isinstance(self.system, System):
@@ -167,7 +172,7 @@ class BiasedPlanner(BaseEstimator):
             )
         return goals[possible]
 
-    def _can_stay(self, reduced: Array) -> Array:
+    def _can_stay(self, reduced: Array) -> NDArray[np.bool_]:
         """Say, row by row, whether g allows the transition that goes nowhere."""
         command = self.system.steer(reduced, reduced[:, : self.system.configuration_dim])
         return self.system.propagate(reduced, command)[1]
@@ -178,7 +183,7 @@ class BiasedPlanner(BaseEstimator):
         trusted = check.classify(goals, goals)
         if trusted.any():
             return goals[trusted]
-        return goals[[np.argmax(check.probability(goals, goals))]]
+        return goals[[int(np.argmax(check.probability(goals, goals)))]]
 
 
 def _as_seed(random_state: RandomState) -> int:
@@ -188,4 +193,4 @@ def _as_seed(random_state: RandomState) -> int:
 
 
 def _is_count(value: Any) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool) and value > 0
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and int(value) > 0

@@ -102,25 +102,27 @@ class CheckTransition:
         if self._estimator is None or len(reduced) == 0:
             return np.ones(len(reduced), dtype=np.bool_)
         self.n_checked += len(reduced)
-        rows = self._system.features(reduced, next_reduced)
-        if self._fast is not None:
-            return (self._fast(rows) > 0) == (self._reliable_column == 1)
-        predicted = np.asarray(self._estimator.predict(rows))
-        if self._reliable_column is None:
-            return np.zeros(len(rows), dtype=np.bool_)
-        return predicted == self._estimator.classes_[self._reliable_column]
+        return self._predict(self._system.features(reduced, next_reduced))
 
-    def probability(self, reduced: Array, next_reduced: Array) -> Array | None:
-        """Return the probability that each transition is Reliable, None without an estimator."""
+    def probability(self, reduced: Array, next_reduced: Array) -> Array:
+        """Return the probability that each transition is Reliable; not counted, and no draws."""
         if self._estimator is None:
-            return None
+            return np.ones(len(reduced))
         if self._reliable_column is None or len(reduced) == 0:
             return np.zeros(len(reduced))
-        if not hasattr(self._estimator, "predict_proba"):
-            return self.classify(reduced, next_reduced).astype(np.float64)
         rows = self._system.features(reduced, next_reduced)
+        if not hasattr(self._estimator, "predict_proba"):
+            return self._predict(rows).astype(np.float64)
         columns = np.asarray(self._estimator.predict_proba(rows), dtype=np.float64)
         return columns[:, self._reliable_column]
+
+    def _predict(self, rows: NDArray[Any]) -> NDArray[np.bool_]:
+        if self._reliable_column is None:
+            return np.zeros(len(rows), dtype=np.bool_)
+        if self._fast is not None:
+            return (self._fast(rows) > 0) == self._reliable_column
+        predicted = np.asarray(self._estimator.predict(rows))
+        return predicted == self._estimator.classes_[self._reliable_column]
 
 
 def _checked_classes(estimator: Any) -> list[Any]:
@@ -163,7 +165,7 @@ def _check_n_features(system: System, estimator: Any) -> None:
 def _resolve_accuracy(estimator: Any, accuracy: float | None) -> float:
     if accuracy is None:
         accuracy = getattr(estimator, "validation_accuracy_", None)
-    if accuracy is None or np.isnan(accuracy):
+    if accuracy is None or (isinstance(accuracy, float) and np.isnan(accuracy)):
         raise ValueError(
             f"accuracy (p_acc) is not known: {type(estimator).__name__} has no "
             "validation_accuracy_ of held-out data. Pass accuracy, measured on plans that the "

@@ -170,20 +170,20 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
             If training diverges.
         """
         self._check_parameters()
-        X, y = validate_data(self, X, y, dtype=np.float32)
-        self.classes_, target = _encode(y)
-        weight = self._row_weights(y, sample_weight)
+        rows, labels = validate_data(self, X, y, dtype=np.float32)
+        self.classes_, target = _encode(labels)
+        weight = self._row_weights(labels, sample_weight)
         rng = as_generator(self.random_state)
-        training, held_out = self._split(len(X), groups, rng)
+        training, held_out = self._split(len(rows), groups, rng)
         used = training[weight[training] > 0]
         if len(used) == 0:
             raise ValueError("sample_weight must be positive for some training row, got zeros.")
         self.history_: list[dict[str, float]] = []
-        self._state: dict[str, NDArray[np.float32]] | None = None
+        self._state: dict[str, NDArray[np.float32]] = {}
         self._forget_module()
         self._constant = _constant_logit(target[used], len(self.classes_))
         if self._constant is None:
-            self._train(X, target, weight, used, held_out, int(rng.integers(2**31)))
+            self._train(rows, target, weight, used, held_out, int(rng.integers(2**31)))
         else:
             warnings.warn(
                 "The training rows are all of one class, which will always be predicted.",
@@ -193,7 +193,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         self._package_versions = {name: version(name) for name in STAMPED_PACKAGES}
         truth = self.classes_[target[held_out]]
         self.validation_accuracy_ = (
-            float(np.mean(self.predict(X[held_out]) == truth)) if len(held_out) else float("nan")
+            float(np.mean(self.predict(rows[held_out]) == truth)) if len(held_out) else float("nan")
         )
         return self
 
@@ -210,18 +210,18 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
             Positive where ``classes_[1]`` is predicted.
         """
         check_is_fitted(self)
-        X = validate_data(self, X, dtype=np.float32, reset=False)
+        rows: NDArray[np.float32] = validate_data(self, X, dtype=np.float32, reset=False)
         if self._constant is not None:
-            return np.full(len(X), self._constant, dtype=np.float32)
+            return np.full(len(rows), self._constant, dtype=np.float32)
         if not _is_mlp(self):
-            return self._torch_logits(X)
-        if len(X) < ROWS_FOR_TORCH:
-            return self._kernel_logits(X)
-        decision = self._torch_logits(X)
+            return self._torch_logits(rows)
+        if len(rows) < ROWS_FOR_TORCH:
+            return self._kernel_logits(rows)
+        decision = self._torch_logits(rows)
         # Rounding must not decide: near the boundary planners and predict ask the same kernel.
-        largest = 1 + np.abs(X).max(axis=1)
+        largest = 1 + np.abs(rows).max(axis=1)
         doubtful = np.abs(decision) < LOGIT_ROUNDING * largest
-        decision[doubtful] = self._kernel_logits(X[doubtful])
+        decision[doubtful] = self._kernel_logits(rows[doubtful])
         return decision
 
     @available_if(_is_mlp)
@@ -348,8 +348,8 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         return mlp_logits(rows, *self._flat, LEAKY_SLOPE)
 
     def _forget_module(self) -> None:
-        vars(self).pop("_module", None)
-        vars(self).pop("_flat", None)
+        self.__dict__.pop("_module", None)
+        self.__dict__.pop("_flat", None)
 
     def _row_weights(self, y: NDArray[Any], sample_weight: ArrayLike | None) -> NDArray[np.float64]:
         weight = np.ones(len(y))
@@ -406,7 +406,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
 
 
 def _is_count(value: Any) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool) and value > 0
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and int(value) > 0
 
 
 def _encode(y: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.intp]]:

@@ -20,7 +20,8 @@ def write_arrays(
     target = Path(path)
     partial = target.with_name(target.name + ".partial")
     with partial.open("wb") as file:
-        np.savez(file, **{_VERSION: np.array(format_version)}, **arrays)
+        named: dict[str, Any] = {_VERSION: np.array(format_version)} | arrays
+        np.savez(file, **named)
     os.replace(partial, target)
 
 
