@@ -10,6 +10,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from reliability.labels import RELIABLE, UNRELIABLE
 from systems.system import Array, System
+from systems.validation import check_number
 
 _NAMES = {"reliable": True, "unreliable": False}
 
@@ -62,7 +63,7 @@ class CheckTransition:
         self._system = system
         self._estimator = estimator
         self._rng = rng
-        _check_number("k", k, 0, np.inf)
+        check_number(k, "k", 0, np.inf)
         if estimator is None:
             return
         self._reliable_column = _reliable_column(_checked_classes(estimator))
@@ -171,11 +172,5 @@ def _resolve_accuracy(estimator: Any, accuracy: float | None) -> float:
             "validation_accuracy_ of held-out data. Pass accuracy, measured on plans that the "
             "estimator was not fitted on."
         )
-    _check_number("accuracy", accuracy, 0, 1)
+    check_number(accuracy, "accuracy", 0, 1)
     return float(accuracy)
-
-
-def _check_number(name: str, value: Any, low: float, high: float) -> None:
-    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    if not number or not low <= value <= high:
-        raise ValueError(f"{name} must be a number between {low} and {high}, got {value!r}.")

@@ -226,7 +226,8 @@ class PlanarArm(System):
         return bool((np.linalg.norm(solutions - executed, axis=1) < tolerance).any())
 
     def _draw_configuration(self, rng: np.random.Generator) -> Array:
-        return rng.uniform(*self.bounds, size=3)
+        low, high = self.bounds
+        return rng.uniform(low, high)
 
     def _draw_resting_start(self, rng: np.random.Generator) -> Array:
         while True:
