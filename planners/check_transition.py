@@ -109,16 +109,30 @@ class CheckTransition:
         """Return the probability that each transition is Reliable; not counted, and no draws."""
         if self._estimator is None:
             return np.ones(len(reduced))
-        if self._reliable_column is None or len(reduced) == 0:
-            return np.zeros(len(reduced))
-        rows = self._system.features(reduced, next_reduced)
+        return self._probability(self._system.features(reduced, next_reduced))
+
+    def appraise(self, reduced: Array, next_reduced: Array) -> tuple[NDArray[np.bool_], Array]:
+        """Return :meth:`classify` and :meth:`probability` in one."""
+        if self._estimator is None or self._fast is None:
+            reliable = self.classify(reduced, next_reduced)
+            return reliable, self.probability(reduced, next_reduced)
+        self.n_checked += len(reduced)
+        probability = self._probability(self._system.features(reduced, next_reduced))
+        return probability > 0.5, probability
+
+    def _probability(self, rows: NDArray[Any]) -> Array:
+        if self._reliable_column is None or len(rows) == 0:
+            return np.zeros(len(rows))
+        if self._fast is not None:
+            logits = self._fast(rows).astype(np.float64)
+            return np.exp(-np.logaddexp(0, -logits if self._reliable_column == 1 else logits))
         if not hasattr(self._estimator, "predict_proba"):
             return self._predict(rows).astype(np.float64)
         columns = np.asarray(self._estimator.predict_proba(rows), dtype=np.float64)
         return columns[:, self._reliable_column]
 
     def _predict(self, rows: NDArray[Any]) -> NDArray[np.bool_]:
-        if self._reliable_column is None:
+        if self._reliable_column is None or len(rows) == 0:
             return np.zeros(len(rows), dtype=np.bool_)
         if self._fast is not None:
             return (self._fast(rows) > 0) == self._reliable_column
