@@ -113,12 +113,17 @@ class CheckTransition:
 
     def appraise(self, reduced: Array, next_reduced: Array) -> tuple[NDArray[np.bool_], Array]:
         """Return :meth:`classify` and :meth:`probability` in one."""
-        if self._estimator is None or self._fast is None:
-            reliable = self.classify(reduced, next_reduced)
-            return reliable, self.probability(reduced, next_reduced)
+        if self._estimator is None or len(reduced) == 0:
+            return np.ones(len(reduced), dtype=np.bool_), np.ones(len(reduced))
         self.n_checked += len(reduced)
-        probability = self._probability(self._system.features(reduced, next_reduced))
-        return probability > 0.5, probability
+        rows = self._system.features(reduced, next_reduced)
+        if self._fast is not None:
+            probability = self._probability(rows)
+            return probability > 0.5, probability
+        reliable = self._predict(rows)
+        if not hasattr(self._estimator, "predict_proba"):
+            return reliable, reliable.astype(np.float64)
+        return reliable, self._probability(rows)
 
     def _probability(self, rows: NDArray[Any]) -> Array:
         if self._reliable_column is None or len(rows) == 0:

@@ -59,7 +59,8 @@ class EdgeChecker:
         """
         possible, origins, following, edge = self._propagate(starts, ends)
         reliable, probability = self._check.appraise(origins, following)
-        doubt = np.bincount(edge, weights=_doubts(probability), minlength=len(starts))
+        doubt = np.zeros(len(starts))
+        np.add.at(doubt, edge, _doubts(probability))
         return _all_per_edge(possible, edge, reliable), doubt
 
     def doubts(self, reduced: Array, next_reduced: Array) -> Array:

@@ -30,7 +30,7 @@ class HalfPlane:
 
 class FastHalfPlane(HalfPlane):
     def fast_decision_function(self, X):
-        return np.where(self.predict(X) == 1, 1.0, -1.0)
+        return np.where(self.predict(X) == 1, 1e3, -1e3)
 
 
 class Nowhere(HalfPlane):
