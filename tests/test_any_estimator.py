@@ -16,7 +16,7 @@ from toy_systems import Disc
 from planners import BiasedRRT, BiasedRRTConnect
 from reliability import TransitionReliabilityClassifier
 
-START, GOAL = np.array([-0.9, -0.1]), np.array([0.55, 0.1])
+START, GOAL = np.array([-0.9, -0.1]), np.array([0.2, 0.6])
 OURS = TransitionReliabilityClassifier(hidden_layer_sizes=(32, 16), max_epochs=20, random_state=0)
 ESTIMATORS = {
     "ours": OURS,
