@@ -20,6 +20,7 @@ import numpy as np
 from arm_pictures import draw_motions, draw_success
 from arm_planners import PLANNERS, RawFeatureArm, execute, make_planner, most_reliable_plan
 from scipy.stats import binomtest
+from tqdm.auto import tqdm
 
 from reliability import (
     RELIABLE,
@@ -146,11 +147,13 @@ def experiment(
 ) -> dict[str, list[dict[str, float]]]:
     """Answer the same queries with every planner; return a record per query and planner."""
     names = list(PLANNERS) if start_at_rest else [*PLANNERS, "ours, best of 6"]
-    shares = np.array_split(np.arange(options.queries), 4 * (options.jobs or 1))
-    answered = joblib.Parallel(n_jobs=options.jobs)(
+    shares = np.array_split(np.arange(options.queries), 8 * (options.jobs or 1))
+    tasks = (
         joblib.delayed(answer)(names, classifiers, seed, start_at_rest, share) for share in shares
     )
-    return {name: [record for share in answered for record in share[name]] for name in names}
+    answered = joblib.Parallel(n_jobs=options.jobs, return_as="generator")(tasks)
+    by_share = list(tqdm(answered, total=len(shares), unit="share", desc="Queries"))
+    return {name: [record for share in by_share for record in share[name]] for name in names}
 
 
 def answer(
