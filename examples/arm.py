@@ -147,7 +147,8 @@ def experiment(
 ) -> dict[str, list[dict[str, float]]]:
     """Answer the same queries with every planner; return a record per query and planner."""
     names = list(PLANNERS) if start_at_rest else [*PLANNERS, "ours, best of 6"]
-    shares = np.array_split(np.arange(options.queries), 8 * (options.jobs or 1))
+    n_shares = min(options.queries, 8 * options.jobs)
+    shares = np.array_split(np.arange(options.queries), n_shares)
     tasks = (
         joblib.delayed(answer)(names, classifiers, seed, start_at_rest, share) for share in shares
     )
@@ -167,7 +168,7 @@ def answer(
     arm = PlanarArm()
     for name in names:
         # Compiled code is loaded on first use, which is no part of planning.
-        plan_query(name, arm, classifiers, HANGING, STANDING[None], seed=0)
+        plan_query(name, arm, classifiers, HANGING, HANGING[None] + 0.2, seed=0)
     records: dict[str, list[dict[str, float]]] = {name: [] for name in names}
     for query in queries:
         problem = arm.sample_reaching_problem(
