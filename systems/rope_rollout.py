@@ -66,7 +66,7 @@ class RopeRollout:
     scene : Scene
     engine : {"mujoco", "pybullet"}
         With "mujoco", going on from a state that an execution returned gives bit by bit what
-        going on without a stop would have given; with "pybullet", within about a centimetre.
+        going on without a stop would have given; with "pybullet", within a millimetre.
 
     References
     ----------
@@ -205,6 +205,8 @@ class RopeRollout:
     def _check_state(self, state: RopeState) -> None:
         as_finite_array(state.grippers, "state.grippers", (2, 3))
         as_finite_array(state.nodes, "state.nodes", (self.scene.n_nodes, 3))
+        if state.simulation is not None and not np.isfinite(state.simulation).all():
+            raise ValueError("state.simulation must be finite, got NaN or infinity in it.")
         if self._clearance(state.grippers) < 0.0:
             raise ValueError(
                 f"state must keep the grippers {GRIPPER_RADIUS} m away from the obstacles, got "
