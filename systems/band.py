@@ -33,7 +33,7 @@ _WORKSPACE = 640
 
 def max_band_points(scene: Scene) -> int:
     """Return the most points that a band in this scene may have."""
-    return 16 + math.ceil(scene.max_band_length / 0.0125)
+    return 24 + math.ceil(scene.max_band_length / 0.01)
 
 
 def reduced_dim(scene: Scene) -> int:

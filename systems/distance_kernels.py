@@ -139,6 +139,16 @@ def capsule_gradient(x: float, y: float, z: float, row: Any) -> tuple[float, flo
 
 
 @njit(cache=True, nogil=True)
+def gradient(x: float, y: float, z: float, row: Any) -> tuple[float, float, float]:
+    """Gradient of the signed distance to one obstacle."""
+    if row[0] == 0.0:
+        return box_gradient(x, y, z, row)
+    if row[0] == 1.0:
+        return cylinder_gradient(x, y, z, row)
+    return capsule_gradient(x, y, z, row)
+
+
+@njit(cache=True, nogil=True)
 def distance_and_gradient(
     x: float, y: float, z: float, packed: Any
 ) -> tuple[float, float, float, float]:
@@ -146,13 +156,7 @@ def distance_and_gradient(
     d, index = nearest_obstacle(x, y, z, packed)
     if index < 0:
         return d, 0.0, 0.0, 0.0
-    row = packed[index]
-    if row[0] == 0.0:
-        gx, gy, gz = box_gradient(x, y, z, row)
-    elif row[0] == 1.0:
-        gx, gy, gz = cylinder_gradient(x, y, z, row)
-    else:
-        gx, gy, gz = capsule_gradient(x, y, z, row)
+    gx, gy, gz = gradient(x, y, z, packed[index])
     return d, gx, gy, gz
 
 
