@@ -13,10 +13,8 @@ from numpy.typing import NDArray
 
 from systems.band_comparison_kernels import (
     compare_rows,
-    fill_homotopic,
     fill_lengths,
     fill_resampled,
-    fill_square_distances,
 )
 from systems.band_kernels import propagate_rows, reduce_points
 from systems.errors import SimulationDivergedError
@@ -33,7 +31,7 @@ _WORKSPACE = 640
 
 def max_band_points(scene: Scene) -> int:
     """Return the most points that a band in this scene may have."""
-    return 16 + math.ceil(scene.max_band_length / 0.0125)
+    return 24 + math.ceil(scene.max_band_length / 0.01)
 
 
 def reduced_dim(scene: Scene) -> int:
@@ -99,6 +97,8 @@ def propagate_bands(
     ----------
     McConachie et al. 2020, "Reduction"; Quinlan 1994.
     """
+    reduced = _as_rows(reduced, "reduced", scene)
+    command = np.ascontiguousarray(as_finite_array(command, "command", (len(reduced), 6)))
     next_reduced, valid = np.empty_like(reduced), np.empty(len(reduced), dtype=np.bool_)
     workspace = np.empty((2, _WORKSPACE, 5))
     propagate_rows(
@@ -108,12 +108,7 @@ def propagate_bands(
 
 
 def bands_close(
-    predicted: Array,
-    executed: Array,
-    scene: Scene,
-    *,
-    n_matched: int = N_MATCHED,
-    alpha: float = CLOSE_DISTANCE,
+    predicted: Array, executed: Array, scene: Scene, n_matched: int = N_MATCHED
 ) -> NDArray[np.bool_]:
     """Say, row by row, whether bands are near one another and of one homotopy class: Close.
 
@@ -122,10 +117,8 @@ def bands_close(
     predicted, executed : ndarray of shape (n, reduced_dim)
     scene : Scene
     n_matched : int
-        Points at which the bands are compared.
-    alpha : float
-        α for 500 points; it is scaled by sqrt(n_matched / 500), so that it always means the
-        same distance from point to point, 2.2 cm in root mean square.
+        Points at which the bands are compared. α is scaled by sqrt(n_matched / 500), so that
+        it always means the same: 2.2 cm from point to point, in root mean square.
 
     Returns
     -------
@@ -135,41 +128,63 @@ def bands_close(
     ----------
     McConachie et al. 2020, "Learning the Classifier".
     """
-    close = np.empty(len(predicted), dtype=np.bool_)
-    max_square = alpha**2 * n_matched / N_MATCHED
-    workspace = np.empty((2, n_matched, 3))
-    compare_rows(predicted, executed, scene.packed, max_square, workspace, close)
-    return close
+    alpha = CLOSE_DISTANCE * math.sqrt(n_matched / N_MATCHED)
+    return _compare(predicted, executed, scene, n_matched, alpha)
+
+
+def same_homotopy_class(reduced: Array, others: Array, scene: Scene) -> NDArray[np.bool_]:
+    """Say, row by row, whether bands deform into one another along straight ways: FOH.
+
+    500 points at the same fractions of the length are matched, and the segments between them
+    must be free of obstacles. It is stricter than first-order homotopy, which matches them
+    freely.
+
+    Parameters
+    ----------
+    reduced, others : ndarray of shape (n, reduced_dim)
+    scene : Scene
+
+    Returns
+    -------
+    homotopic : ndarray of bool of shape (n,)
+
+    References
+    ----------
+    McConachie et al. 2020, "Learning the Classifier"; Jaillet and Simeon 2008.
+    """
+    return _compare(reduced, others, scene, N_MATCHED, math.inf)
 
 
 def band_distance(reduced: Array, others: Array, n_matched: int = N_MATCHED) -> Array:
     """Euclidean norm of the differences of matched points, row by row: the paper's D.
+
+    Parameters
+    ----------
+    reduced, others : ndarray of shape (n, reduced_dim)
+    n_matched : int
+        Points, evenly spaced along each band.
 
     Returns
     -------
     distances : ndarray of shape (n,)
         Metres.
     """
-    squares = np.empty(len(reduced))
-    fill_square_distances(reduced, others, np.empty((2, n_matched, 3)), squares)
-    return np.sqrt(squares)
+    differences = resample_bands(reduced, n_matched) - resample_bands(others, n_matched)
+    return np.linalg.norm(differences.reshape(len(differences), -1), axis=1)
 
 
-def same_homotopy_class(
-    reduced: Array, others: Array, scene: Scene, n_matched: int = N_MATCHED
-) -> NDArray[np.bool_]:
-    """Say, row by row, whether bands deform into one another along straight ways: FOH.
+def resample_bands(reduced: Array, n_points: int = N_MATCHED) -> Array:
+    """Return evenly spaced points along each row's band, shape (n, n_points, 3)."""
+    points = np.empty((len(reduced), n_points, 3))
+    fill_resampled(np.ascontiguousarray(reduced), points)
+    return points
 
-    Points at the same fraction of the length are matched, and the segments between them must
-    be free of obstacles. It is stricter than first-order homotopy, which matches them freely.
 
-    Returns
-    -------
-    homotopic : ndarray of bool of shape (n,)
-    """
-    homotopic = np.empty(len(reduced), dtype=np.bool_)
-    fill_homotopic(reduced, others, scene.packed, np.empty((2, n_matched, 3)), homotopic)
-    return homotopic
+def band_length(reduced: Array) -> Array:
+    """Return the length of each row's band, metres, shape (n,)."""
+    lengths = np.empty(len(reduced))
+    fill_lengths(np.ascontiguousarray(reduced), lengths)
+    return lengths
 
 
 def band_points(reduced: Array) -> Array:
@@ -179,15 +194,18 @@ def band_points(reduced: Array) -> Array:
     return points[: max(2, int(differs.nonzero()[0].max(initial=0)) + 2)]
 
 
-def band_length(reduced: Array) -> Array:
-    """Return the length of each row's band, metres, shape (n,)."""
-    lengths = np.empty(len(reduced))
-    fill_lengths(reduced, lengths)
-    return lengths
+def _compare(
+    reduced: Array, others: Array, scene: Scene, n_matched: int, max_distance: float
+) -> NDArray[np.bool_]:
+    reduced, others = _as_rows(reduced, "reduced", scene), _as_rows(others, "others", scene)
+    if len(reduced) != len(others):
+        raise ValueError(f"Give as many bands as others, got {len(reduced)} and {len(others)}.")
+    close = np.empty(len(reduced), dtype=np.bool_)
+    workspace = np.empty((2, n_matched, 3))
+    compare_rows(reduced, others, scene.packed, max_distance**2, workspace, close)
+    return close
 
 
-def resample_bands(reduced: Array, n_points: int = N_MATCHED) -> Array:
-    """Return evenly spaced points along each row's band, shape (n, n_points, 3)."""
-    points = np.empty((len(reduced), n_points, 3))
-    fill_resampled(reduced, points)
-    return points
+def _as_rows(rows: Array, name: str, scene: Scene) -> Array:
+    # A copy is made only of rows that the kernels could not read.
+    return np.ascontiguousarray(as_finite_array(rows, name, (None, reduced_dim(scene))))

@@ -124,21 +124,3 @@ def fill_resampled(rows: Any, points: Any) -> None:
     """Write evenly spaced points of each row's band."""
     for i in range(rows.shape[0]):
         resample_row(rows[i], points[i])
-
-
-@njit(cache=True, nogil=True)
-def fill_square_distances(rows: Any, others: Any, workspace: Any, squares: Any) -> None:
-    """Write the sum of the squared distances of matched points of each pair of bands."""
-    for i in range(rows.shape[0]):
-        resample_row(rows[i], workspace[0])
-        resample_row(others[i], workspace[1])
-        squares[i] = square_distance(workspace[0], workspace[1])
-
-
-@njit(cache=True, nogil=True)
-def fill_homotopic(rows: Any, others: Any, packed: Any, workspace: Any, homotopic: Any) -> None:
-    """Write whether the straight ways between matched points of each pair are free."""
-    for i in range(rows.shape[0]):
-        resample_row(rows[i], workspace[0])
-        resample_row(others[i], workspace[1])
-        homotopic[i] = segments_free(workspace[0], workspace[1], packed)

@@ -13,16 +13,22 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from systems.distance_kernels import distance, distance_and_gradient
+from systems.distance_kernels import (
+    distance,
+    distance_and_gradient,
+    gradient,
+    nearest_obstacle,
+)
 
 # The clearance is the rope's radius: points of a band keep it, the rope's centre line must.
 CLEARANCE = 0.01
 OVERLAP = 0.004
 TOLERANCE = 1e-4
 
-_REMOVAL_FACTOR = 1.2  # neighbours of a removed bubble overlap with this much to spare
+_REMOVAL_FACTOR = 1.35  # neighbours of a removed bubble overlap with this much to spare
 _STEP_FACTOR = 0.9  # of a bubble's radius, in one move
 _MAX_FILL = 40
+_MAX_HALVINGS = 5
 _MIN_GAIN = 1e-10
 _MARGIN = 1e-7
 
@@ -50,14 +56,14 @@ def apart(p: Any, q: Any) -> float:
 @njit(cache=True, nogil=True)
 def pushed_out(x: float, y: float, z: float, packed: Any) -> tuple[float, float, float, float]:
     """Return the bubble at a point, moved out of obstacles as far as the clearance asks."""
-    d = distance(x, y, z, packed)
+    d, index = nearest_obstacle(x, y, z, packed)
     for _ in range(8):
         if d >= CLEARANCE:
             break
-        d, gx, gy, gz = distance_and_gradient(x, y, z, packed)
+        gx, gy, gz = gradient(x, y, z, packed[index])
         step = CLEARANCE + _MARGIN - d
         x, y, z = x + step * gx, y + step * gy, z + step * gz
-        d = distance(x, y, z, packed)
+        d, index = nearest_obstacle(x, y, z, packed)
     return x, y, z, d
 
 
@@ -83,6 +89,25 @@ def triangle_covered(a: Any, b: Any, c: Any) -> bool:
 
 
 @njit(cache=True, nogil=True)
+def link(last: Any, target: Any, gap: float, packed: Any) -> tuple[float, float, float, float]:
+    """Return a bubble on the way to a target that overlaps the last one, or one too small."""
+    # So far away, any bubble that keeps the clearance overlaps the last one; but around a
+    # corner it is pushed aside, and has to be sought nearer.
+    ratio = min(0.9, (last[3] + CLEARANCE - OVERLAP) / gap)
+    for _ in range(_MAX_HALVINGS):
+        bubble = pushed_out(
+            last[0] + ratio * (target[0] - last[0]),
+            last[1] + ratio * (target[1] - last[1]),
+            last[2] + ratio * (target[2] - last[2]),
+            packed,
+        )
+        if bubble[3] >= CLEARANCE and apart(last, bubble) + OVERLAP <= last[3] + bubble[3]:
+            return bubble
+        ratio *= 0.5
+    return last[0], last[1], last[2], -1.0
+
+
+@njit(cache=True, nogil=True)
 def fill(chain: Any, n: int, target: Any, packed: Any) -> int:
     """Append bubbles to a chain of ``n`` until it overlaps ``target``; -1 if that fails."""
     for _ in range(_MAX_FILL):
@@ -90,17 +115,10 @@ def fill(chain: Any, n: int, target: Any, packed: Any) -> int:
         gap = apart(last, target)
         if gap + OVERLAP <= last[3] + target[3]:
             return n
-        if n >= chain.shape[0] - 1 or last[3] < OVERLAP:
+        if n >= chain.shape[0] - 1:
             return -1
-        # So far away, any bubble that keeps the clearance overlaps the last one.
-        ratio = min(0.9, (last[3] + CLEARANCE - OVERLAP) / gap)
-        bubble = pushed_out(
-            last[0] + ratio * (target[0] - last[0]),
-            last[1] + ratio * (target[1] - last[1]),
-            last[2] + ratio * (target[2] - last[2]),
-            packed,
-        )
-        if bubble[3] < CLEARANCE or apart(last, bubble) + OVERLAP > last[3] + bubble[3]:
+        bubble = link(last, target, gap, packed)
+        if bubble[3] < CLEARANCE:
             return -1
         put(chain, n, bubble, 1.0)
         n += 1
@@ -172,7 +190,7 @@ def move(
     way = np.sqrt(x * x + y * y + z * z)
     if way > moved_at_least:
         scale = min(1.0, _STEP_FACTOR * bubble[3] / way)
-        for _ in range(3):
+        for _ in range(2):
             new = pushed_out(
                 bubble[0] + scale * x, bubble[1] + scale * y, bubble[2] + scale * z, packed
             )

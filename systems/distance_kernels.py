@@ -11,60 +11,68 @@ EMPTY = 1e9  # distance to an environment without obstacles
 
 
 @njit(cache=True, nogil=True, inline="always")
-def cylinder_distance(x: float, y: float, z: float, row: Any) -> float:
-    """Signed distance to a cylinder along an axis."""
+def cylinder_distance(x: float, y: float, z: float, row: Any, bound: float) -> float:
+    """Signed distance to a cylinder along an axis, or ``bound`` where it is no smaller."""
     u, v, w = x - row[1], y - row[2], z - row[3]
     if row[4] == 0.0:
         u, v, w = v, w, u
     elif row[4] == 1.0:
         u, v, w = u, w, v
-    radial = np.sqrt(u * u + v * v) - row[7]
-    axial = abs(w) - row[5]
-    if radial <= 0.0 and axial <= 0.0:
+    axial, reach, square = abs(w) - row[5], bound + row[7], u * u + v * v
+    # Most cylinders are too far away to matter, which is seen before any root is taken.
+    if axial >= bound or (reach > 0.0 and square >= reach * reach):
+        return bound
+    radial = np.sqrt(square) - row[7]
+    if radial <= 0.0 or axial <= 0.0:
         return max(radial, axial)
-    radial, axial = max(radial, 0.0), max(axial, 0.0)
     return np.sqrt(radial * radial + axial * axial)
 
 
 @njit(cache=True, nogil=True, inline="always")
-def capsule_distance(x: float, y: float, z: float, row: Any) -> float:
-    """Signed distance to a capsule."""
+def capsule_distance(x: float, y: float, z: float, row: Any, bound: float) -> float:
+    """Signed distance to a capsule, or ``bound`` where it is no smaller."""
     u, v, w = x - row[1], y - row[2], z - row[3]
     along = u * row[4] + v * row[5] + w * row[6]
     along /= row[4] * row[4] + row[5] * row[5] + row[6] * row[6]
     along = min(1.0, max(0.0, along))
     u, v, w = u - along * row[4], v - along * row[5], w - along * row[6]
-    return np.sqrt(u * u + v * v + w * w) - row[7]
+    square, reach = u * u + v * v + w * w, bound + row[7]
+    if reach > 0.0 and square >= reach * reach:
+        return bound
+    return np.sqrt(square) - row[7]
 
 
 @njit(cache=True, nogil=True)
 def nearest_obstacle(x: float, y: float, z: float, packed: Any) -> tuple[float, int]:
     """Return the signed distance to the nearest obstacle and its row, or -1 without any."""
-    best, inside, index = EMPTY * EMPTY, 0.0, -1
     n = packed.shape[0]
-    i = 0
-    # Boxes come first; squares are compared, so that one root serves them all.
-    while i < n and packed[i, 0] == 0.0:
+    n_boxes, best, depth, index = n, EMPTY * EMPTY, 0.0, -1
+    # Boxes come first; squares are compared, so that one root serves them all. This is the
+    # hottest loop of the rope: `max` would look for NaN.
+    for i in range(n):
+        if packed[i, 0] != 0.0:
+            n_boxes = i
+            break
         u = abs(x - packed[i, 1]) - packed[i, 4]
         v = abs(y - packed[i, 2]) - packed[i, 5]
         w = abs(z - packed[i, 3]) - packed[i, 6]
-        u0, v0, w0 = max(u, 0.0), max(v, 0.0), max(w, 0.0)
-        square = u0 * u0 + v0 * v0 + w0 * w0
-        if square <= 0.0:
-            depth = max(u, v, w)
-            if depth < inside or index < 0 or best > 0.0:
-                inside, index = depth, i
-            best = 0.0
-        elif square < best:
+        a = u if u > 0.0 else 0.0
+        b = v if v > 0.0 else 0.0
+        c = w if w > 0.0 else 0.0
+        square = a * a + b * b + c * c
+        if square < best:
             best, index = square, i
-        i += 1
-    distance = inside if best == 0.0 else np.sqrt(best)
-    while i < n:
+        if square == 0.0 and max(u, v, w) < depth:
+            depth, index = max(u, v, w), i
+    distance = np.sqrt(best) + depth
+    for i in range(n_boxes, n):
         row = packed[i]
-        other = cylinder_distance(x, y, z, row) if row[0] == 1.0 else capsule_distance(x, y, z, row)
+        if row[0] == 1.0:
+            other = cylinder_distance(x, y, z, row, distance)
+        else:
+            other = capsule_distance(x, y, z, row, distance)
         if other < distance:
             distance, index = other, i
-        i += 1
     return distance, index
 
 
@@ -131,6 +139,16 @@ def capsule_gradient(x: float, y: float, z: float, row: Any) -> tuple[float, flo
 
 
 @njit(cache=True, nogil=True)
+def gradient(x: float, y: float, z: float, row: Any) -> tuple[float, float, float]:
+    """Gradient of the signed distance to one obstacle."""
+    if row[0] == 0.0:
+        return box_gradient(x, y, z, row)
+    if row[0] == 1.0:
+        return cylinder_gradient(x, y, z, row)
+    return capsule_gradient(x, y, z, row)
+
+
+@njit(cache=True, nogil=True)
 def distance_and_gradient(
     x: float, y: float, z: float, packed: Any
 ) -> tuple[float, float, float, float]:
@@ -138,13 +156,7 @@ def distance_and_gradient(
     d, index = nearest_obstacle(x, y, z, packed)
     if index < 0:
         return d, 0.0, 0.0, 0.0
-    row = packed[index]
-    if row[0] == 0.0:
-        gx, gy, gz = box_gradient(x, y, z, row)
-    elif row[0] == 1.0:
-        gx, gy, gz = cylinder_gradient(x, y, z, row)
-    else:
-        gx, gy, gz = capsule_gradient(x, y, z, row)
+    gx, gy, gz = gradient(x, y, z, packed[index])
     return d, gx, gy, gz
 
 

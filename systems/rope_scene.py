@@ -115,7 +115,9 @@ def hanging_rope(grippers: ArrayLike, rope_length: float, n_nodes: int) -> Array
     first, last = as_finite_array(grippers, "grippers", (2, 3))
     fraction = np.linspace(0.0, 1.0, n_nodes)[:, None]
     if np.linalg.norm(last - first) >= rope_length * (1.0 - 1e-6):
-        return first + fraction * (last - first)
+        nodes = first + fraction * (last - first)
+        nodes[-1] = last
+        return nodes
     across, height = _catenary(last - first, rope_length, fraction[:, 0] * rope_length)
     nodes = first + across[:, None] * (last - first)
     nodes[:, 2] = first[2] + height
