@@ -21,6 +21,8 @@ class StopReason(Enum):
 
     COMPLETED = "Every command was carried out."
     CONSTRAINT = "The system reached the boundary of a constraint and stopped there."
+    GRIPPER_CONTACT = "A gripper would have touched an obstacle and stopped before it."
+    OVERSTRETCHED = "The rope reached its largest allowed stretch and stopped there."
 
 
 @dataclass(frozen=True)
