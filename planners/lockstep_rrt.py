@@ -66,8 +66,7 @@ class LockstepRRT:
         return self._system.steer(start, start[:, : self._system.configuration_dim])[:0]
 
     def _sample(self) -> Array:
-        low, high = self._system.bounds
-        samples = self._rng.uniform(low, high, size=(EXTENSIONS_PER_ROUND, len(low)))
+        samples = self._system.sample_configurations(self._rng, EXTENSIONS_PER_ROUND)
         to_goal = self._rng.random(EXTENSIONS_PER_ROUND) < GOAL_BIAS
         chosen = self._rng.integers(len(self._goals), size=int(to_goal.sum()))
         samples[to_goal] = self._goals[chosen]

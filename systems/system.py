@@ -176,6 +176,23 @@ class System(ABC):
     def sample_problem(self, random_state: RandomState = None) -> Problem:
         """Draw a start state and a goal."""
 
+    def sample_configurations(self, rng: np.random.Generator, n: int) -> Array:
+        """Draw configurations for :class:`planners.BiasedRRT` to grow towards.
+
+        Uniform within ``bounds``; override it where few of those make sense.
+
+        Parameters
+        ----------
+        rng : Generator
+        n : int
+
+        Returns
+        -------
+        configurations : ndarray of shape (n, configuration_dim)
+        """
+        low, high = self.bounds
+        return rng.uniform(low, high, size=(n, len(low)))
+
     @abstractmethod
     def goal_reached(self, reduced: Array, goal: Array) -> NDArray[np.bool_]:
         """Say, row by row, whether a reduced state is a goal for the planner: Goal_B.

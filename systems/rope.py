@@ -1,0 +1,218 @@
+"""The rope: two grippers move its ends among obstacles that it may catch on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from systems.band import bands_close, propagate_bands, reduce_rope, reduced_dim
+from systems.distance import signed_distance
+from systems.rope_features import vector_features
+from systems.rope_rollout import ENGINES, RopeRollout, rope_length
+from systems.rope_scene import (
+    GRIPPER_CLEARANCE,
+    NODE_SPACING,
+    ROPE_RADIUS,
+    Scene,
+    hanging_rope,
+)
+from systems.rope_scenes import load_scene
+from systems.rope_state import RopeState
+from systems.system import Array, Problem, Rollout, System
+from systems.validation import RandomState, as_finite_array, as_generator
+
+STEP_SIZE = 0.025
+GOAL_DISTANCE = 0.025
+# Share of the problems that begin where the scene says. It makes about as many of the
+# transitions Unreliable as in the paper's data.
+SCENE_START_SHARE = 0.25
+
+_ROUNDING = 1e-9
+_MOST_DRAWS = 1000
+
+
+class Rope(System):
+    """A rope held by two grippers; its reduced state is the rope pulled taut.
+
+    True states are :class:`systems.rope_state.RopeState`. A reduced state is the positions of
+    grippers A and B, which are its configuration, and then the points of the elastic band from A
+    to B (see :mod:`systems.band`); commands are displacements of A and B, together no more than
+    ``step_size``. All are metres in the world frame, z up.
+
+    Parameters
+    ----------
+    scene : str or Scene, default="simple_hook"
+        One of the paper's scenes by name (``systems.rope_scenes.SCENE_NAMES``), or your own.
+    engine : {"mujoco", "pybullet"}, default="mujoco"
+        Simulates the rope in :meth:`rollout`; started when it is first needed.
+
+    Raises
+    ------
+    ValueError
+        If there is no such scene or engine.
+
+    References
+    ----------
+    McConachie et al. 2020, "Application to rope manipulation".
+    """
+
+    configuration_dim = 6
+    step_size = STEP_SIZE
+
+    def __init__(self, scene: str | Scene = "simple_hook", engine: str = "mujoco") -> None:
+        if isinstance(scene, str):
+            scene = load_scene(scene)
+        if not isinstance(scene, Scene):
+            raise ValueError(f"scene must be a Scene or the name of one, got {scene!r}.")
+        if engine not in ENGINES:
+            raise ValueError(f"engine must be one of {', '.join(ENGINES)}, got {engine!r}.")
+        self.scene = scene
+        self.engine = engine
+        self.reduced_dim = reduced_dim(scene)
+        self.bounds = np.tile(scene.bounds, 2)
+        self._packed = scene.packed
+        self._execution = RopeRollout(scene, engine)
+
+    def reduce(self, state: RopeState) -> Array:
+        """Pull the rope taut: r.
+
+        Raises
+        ------
+        SimulationDivergedError
+            If the rope passes through an obstacle.
+        """
+        _check_state(state)
+        return reduce_rope(state.nodes, state.grippers, self.scene)
+
+    def propagate(self, reduced: Array, command: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Move the ends of bands and let the bands contract: g.
+
+        A successor keeps the grippers 0.03 m away from the obstacles, the world's bounds and one
+        another; grippers that are nearer may not come nearer still. And its band is not
+        overstretched. What costs least is checked first.
+        """
+        rows = as_finite_array(reduced, "reduced", (None, self.reduced_dim))
+        moves = as_finite_array(command, "command", (len(rows), 6))
+        here = self._gripper_margin(rows[:, :6])
+        there = self._gripper_margin(rows[:, :6] + moves)
+        valid = there >= np.minimum(here, GRIPPER_CLEARANCE) - _ROUNDING
+        next_reduced = rows.copy()
+        clear = np.flatnonzero(valid)
+        if len(clear):
+            bands, possible = propagate_bands(rows[clear], moves[clear], self.scene)
+            next_reduced[clear], valid[clear] = bands, possible
+        return next_reduced, valid
+
+    def steer(self, reduced: Array, configuration: Array) -> Array:
+        """Return the displacement of at most one step, in R^6, towards gripper positions."""
+        rows = as_finite_array(reduced, "reduced", (None, self.reduced_dim))
+        targets = as_finite_array(configuration, "configuration", (len(rows), 6))
+        way = targets - rows[:, :6]
+        length = np.sqrt(np.einsum("ij,ij->i", way, way))
+        scale = np.minimum(1.0, self.step_size / np.maximum(length, 1e-300))
+        return way * scale[:, None]
+
+    def rollout(self, state: RopeState, commands: ArrayLike) -> Rollout:
+        """Carry out displacements in turn, quasi-statically: Γ.
+
+        Stops before a gripper, a sphere of 23 mm, would enter an obstacle, and before the rope
+        would be longer than ``scene.max_band_length``.
+
+        Raises
+        ------
+        ValueError
+            If the state is not one of this scene and engine, or something is not finite.
+        SimulationDivergedError
+            If the simulator diverged.
+        """
+        _check_state(state)
+        return self._execution.execute(state, commands)
+
+    def close(self, predicted: Array, executed: Array) -> NDArray[np.bool_]:
+        """Say whether bands are near one another and of one homotopy class: Close."""
+        return bands_close(predicted, executed, self.scene)
+
+    def features(self, reduced: Array, next_reduced: Array) -> Array:
+        """Return (n, 13) rows: lengths, and what could catch the rope between the grippers."""
+        return vector_features(reduced, next_reduced, self.scene)
+
+    def scene_problem(self) -> Problem:
+        """Return the scene's own start, at rest, and its goal."""
+        return Problem(self._execution.settle(self.scene.start_rope()), self._goal())
+
+    def sample_problem(self, random_state: RandomState = None) -> Problem:
+        """Draw a start at which the rope hangs at rest; the goal is the scene's.
+
+        One start in four is the scene's own. Of the others, gripper A is uniform in the clear
+        part of the world and gripper B in what the rope at rest reaches of it, as long as the
+        rope between them hangs free of obstacles.
+        """
+        rng = as_generator(random_state)
+        if rng.random() < SCENE_START_SHARE:
+            return self.scene_problem()
+        for _ in range(_MOST_DRAWS):
+            nodes = self._draw_hanging_rope(rng)
+            if nodes is not None:
+                state = self._execution.settle(nodes)
+                if rope_length(state) <= self.scene.max_band_length:
+                    return Problem(state, self._goal())
+        raise ValueError(
+            f"scene {self.scene.name!r} has no room for a hanging rope: none of {_MOST_DRAWS} "
+            "starts was free of obstacles. Give a larger world or a shorter rope."
+        )
+
+    def sample_configurations(self, rng: np.random.Generator, n: int) -> Array:
+        """Draw gripper positions in clear space, no farther apart than the rope may stretch."""
+        return self._draw_grippers(rng, n, self.scene.max_band_length)
+
+    def goal_reached(self, reduced: Array, goal: Array) -> NDArray[np.bool_]:
+        """Say, row by row, whether the grippers are within 0.025 m, in R^6, of a goal: Goal_B."""
+        way = reduced[:, None, :6] - goal[None]
+        return (np.linalg.norm(way, axis=2) <= GOAL_DISTANCE).any(axis=1)
+
+    def succeeded(self, state: RopeState, goal: ArrayLike, tolerance: float) -> bool:
+        """Say whether the grippers are within ``tolerance``, metres in R^6, of a goal: Goal_X."""
+        _check_state(state)
+        goals = as_finite_array(goal, "goal", (None, 6))
+        return bool((np.linalg.norm(goals - state.grippers.ravel(), axis=1) <= tolerance).any())
+
+    def _goal(self) -> Array:
+        return self.scene.goal.reshape(1, 6).copy()
+
+    def _gripper_margin(self, configurations: Array) -> Array:
+        """How far grippers are from obstacles, bounds and one another, whichever is least."""
+        grippers = configurations.reshape(-1, 2, 3)
+        low, high = self.scene.bounds
+        inside = np.minimum(grippers - low, high - grippers).min(axis=(1, 2))
+        way = grippers[:, 0] - grippers[:, 1]
+        apart = np.sqrt(np.einsum("ij,ij->i", way, way))
+        clear = signed_distance(grippers, self._packed).min(axis=1)
+        return np.minimum(np.minimum(inside, apart), clear)
+
+    def _draw_grippers(self, rng: np.random.Generator, n: int, reach: float) -> Array:
+        low, high = self.scene.bounds + [[GRIPPER_CLEARANCE], [-GRIPPER_CLEARANCE]]
+        drawn = np.empty((0, 6))
+        while len(drawn) < n:
+            first = rng.uniform(low, high, size=(2 * n, 3))
+            second = rng.uniform(np.maximum(low, first - reach), np.minimum(high, first + reach))
+            pairs = np.hstack([first, second])
+            near = np.linalg.norm(second - first, axis=1) <= reach
+            good = near & (self._gripper_margin(pairs) >= GRIPPER_CLEARANCE)
+            drawn = np.concatenate([drawn, pairs[good]])
+        return drawn[:n]
+
+    def _draw_hanging_rope(self, rng: np.random.Generator) -> Array | None:
+        length = self.scene.rope_length
+        grippers = self._draw_grippers(rng, 1, length).reshape(2, 3)
+        finely = 1 + 4 * round(length / NODE_SPACING)
+        rope = hanging_rope(grippers, length, finely)
+        if signed_distance(rope, self._packed).min() < ROPE_RADIUS:
+            return None
+        return hanging_rope(grippers, length, self.scene.n_nodes)
+
+
+def _check_state(state: Any) -> None:
+    if not isinstance(state, RopeState):
+        raise ValueError(f"state must be a RopeState, got {state!r}.")
