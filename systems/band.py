@@ -26,7 +26,8 @@ N_MATCHED = 500
 # α of the paper, for a distance over 500 matched points.
 CLOSE_DISTANCE = 0.5
 
-_WORKSPACE = 640
+# Two chains of points, for the kernels to work in.
+WORKSPACE_SHAPE = (2, 640, 5)
 
 
 def max_band_points(scene: Scene) -> int:
@@ -66,7 +67,7 @@ def reduce_rope(nodes: Array, grippers: Array, scene: Scene) -> Array:
     first, last = as_finite_array(grippers, "grippers", (2, 3))
     points = np.vstack([first, nodes, last])
     reduced = np.empty(reduced_dim(scene))
-    code = reduce_points(points, scene.packed, np.empty((2, _WORKSPACE, 5)), reduced)
+    code = reduce_points(points, scene.packed, np.empty(WORKSPACE_SHAPE), reduced)
     if code == -1:
         raise SimulationDivergedError("The rope or a gripper passes through an obstacle.")
     if code == -2:
@@ -100,7 +101,7 @@ def propagate_bands(
     reduced = _as_rows(reduced, "reduced", scene)
     command = np.ascontiguousarray(as_finite_array(command, "command", (len(reduced), 6)))
     next_reduced, valid = np.empty_like(reduced), np.empty(len(reduced), dtype=np.bool_)
-    workspace = np.empty((2, _WORKSPACE, 5))
+    workspace = np.empty(WORKSPACE_SHAPE)
     propagate_rows(
         reduced, command, scene.packed, scene.max_band_length, workspace, next_reduced, valid
     )

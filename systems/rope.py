@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from systems.band import bands_close, propagate_bands, reduce_rope, reduced_dim
+from systems.band import WORKSPACE_SHAPE, bands_close, reduce_rope, reduced_dim
 from systems.distance import signed_distance
 from systems.rope_features import vector_features
+from systems.rope_kernels import all_finite, fill_margins, propagate_rope_rows, steer_rows
 from systems.rope_rollout import ENGINES, RopeRollout, rope_length
 from systems.rope_scene import (
     GRIPPER_CLEARANCE,
@@ -29,7 +30,6 @@ GOAL_DISTANCE = 0.025
 # transitions Unreliable as in the paper's data.
 SCENE_START_SHARE = 0.25
 
-_ROUNDING = 1e-9
 _MOST_DRAWS = 1000
 
 
@@ -93,26 +93,29 @@ class Rope(System):
         another; grippers that are nearer may not come nearer still. And its band is not
         overstretched. What costs least is checked first.
         """
-        rows = as_finite_array(reduced, "reduced", (None, self.reduced_dim))
-        moves = as_finite_array(command, "command", (len(rows), 6))
-        here = self._gripper_margin(rows[:, :6])
-        there = self._gripper_margin(rows[:, :6] + moves)
-        valid = there >= np.minimum(here, GRIPPER_CLEARANCE) - _ROUNDING
-        next_reduced = rows.copy()
-        clear = np.flatnonzero(valid)
-        if len(clear):
-            bands, possible = propagate_bands(rows[clear], moves[clear], self.scene)
-            next_reduced[clear], valid[clear] = bands, possible
+        rows = self._as_rows(reduced, "reduced", self.reduced_dim)
+        moves = self._as_rows(command, "command", 6, len(rows))
+        next_reduced, valid = np.empty_like(rows), np.empty(len(rows), dtype=np.bool_)
+        propagate_rope_rows(
+            rows,
+            moves,
+            self.bounds,
+            self._packed,
+            GRIPPER_CLEARANCE,
+            self.scene.max_band_length,
+            np.empty(WORKSPACE_SHAPE),
+            next_reduced,
+            valid,
+        )
         return next_reduced, valid
 
     def steer(self, reduced: Array, configuration: Array) -> Array:
         """Return the displacement of at most one step, in R^6, towards gripper positions."""
-        rows = as_finite_array(reduced, "reduced", (None, self.reduced_dim))
-        targets = as_finite_array(configuration, "configuration", (len(rows), 6))
-        way = targets - rows[:, :6]
-        length = np.sqrt(np.einsum("ij,ij->i", way, way))
-        scale = np.minimum(1.0, self.step_size / np.maximum(length, 1e-300))
-        return way * scale[:, None]
+        rows = self._as_rows(reduced, "reduced", self.reduced_dim)
+        targets = self._as_rows(configuration, "configuration", 6, len(rows))
+        command = np.empty_like(targets)
+        steer_rows(rows, targets, self.step_size, command)
+        return command
 
     def rollout(self, state: RopeState, commands: ArrayLike) -> Rollout:
         """Carry out displacements in turn, quasi-statically: Γ.
@@ -183,13 +186,18 @@ class Rope(System):
 
     def _gripper_margin(self, configurations: Array) -> Array:
         """How far grippers are from obstacles, bounds and one another, whichever is least."""
-        grippers = configurations.reshape(-1, 2, 3)
-        low, high = self.scene.bounds
-        inside = np.minimum(grippers - low, high - grippers).min(axis=(1, 2))
-        way = grippers[:, 0] - grippers[:, 1]
-        apart = np.sqrt(np.einsum("ij,ij->i", way, way))
-        clear = signed_distance(grippers, self._packed).min(axis=1)
-        return np.minimum(np.minimum(inside, apart), clear)
+        margins = np.empty(len(configurations))
+        fill_margins(configurations, self.bounds, self._packed, margins)
+        return margins
+
+    def _as_rows(self, rows: Array, name: str, width: int, n_rows: int | None = None) -> Array:
+        """Check rows as fast as planners need it."""
+        fits = getattr(rows, "ndim", 0) == 2 and rows.shape[1] == width
+        if not fits or rows.dtype != np.float64 or n_rows not in (None, len(rows)):
+            rows = as_finite_array(rows, name, (n_rows, width))
+        if not all_finite(rows):
+            raise ValueError(f"{name} must be finite, got NaN or infinity.")
+        return rows
 
     def _draw_grippers(self, rng: np.random.Generator, n: int, reach: float) -> Array:
         low, high = self.scene.bounds + [[GRIPPER_CLEARANCE], [-GRIPPER_CLEARANCE]]
