@@ -32,7 +32,7 @@ WORKSPACE_SHAPE = (2, 640, 5)
 
 def max_band_points(scene: Scene) -> int:
     """Return the most points that a band in this scene may have."""
-    return 24 + math.ceil(scene.max_band_length / 0.01)
+    return 32 + math.ceil(scene.max_band_length / 0.05)
 
 
 def reduced_dim(scene: Scene) -> int:

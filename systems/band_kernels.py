@@ -1,9 +1,9 @@
-"""Compiled contraction of an elastic band of bubbles.
+"""Compiled contraction of an elastic band.
 
-A bubble is a point with its distance to the obstacles, so that the ball around it is free. A
-band is a chain of bubbles, each overlapping the next, and so lies in free space between its
-points too. Every change of a band is certified: the triangles that the band sweeps are covered
-by bubbles, so that it cannot jump over an obstacle, and it never gets longer.
+A band is a polyline whose points know their distance to the obstacles. Every change of it is
+certified by bubbles, balls as large as the distance at their centre: they cover the new
+segments and the area that the old ones sweep on their way there. So a band lies in free space
+all along, cannot jump over an obstacle, and never gets longer by a change.
 """
 
 from __future__ import annotations
@@ -20,235 +20,289 @@ from systems.distance_kernels import (
     nearest_obstacle,
 )
 
-# The clearance is the rope's radius: points of a band keep it, the rope's centre line must.
+# Points keep the rope's radius away from obstacles, as its centre line must; segments may pass
+# more closely, so that a corner needs few points.
 CLEARANCE = 0.01
-OVERLAP = 0.004
-TOLERANCE = 1e-4
+FLOOR = 0.006
 
-_REMOVAL_FACTOR = 1.35  # neighbours of a removed bubble overlap with this much to spare
-_STEP_FACTOR = 0.9  # of a bubble's radius, in one move
-_MAX_FILL = 40
-_MAX_HALVINGS = 5
+_CONTACT = 1e-4  # so much farther away, a point still touches
+_STEP_FACTOR = 0.9  # of the distance to the obstacles, in one move
+_MIN_BUBBLE = 1e-3
+_MAX_BUBBLES = 2000
 _MIN_GAIN = 1e-10
+_MIN_MOVE = 5e-5
 _MARGIN = 1e-7
+_N_TRIES = 3
+_N_SLIDES = 3
+_SLIDE_FACTOR = 1.1  # more than 1 leads away from the obstacle, and is not blocked again
+_MAX_LINKS = 20
+_NO_WAY = (0.0, 0.0, 0.0)
 
 
 @njit(cache=True, nogil=True, inline="always")
-def bubble_at(chain: Any, i: int) -> tuple[float, float, float, float]:
-    """Read point and radius of a bubble; chains have rows x, y, z, radius, changed."""
+def point_at(chain: Any, i: int) -> tuple[float, float, float, float]:
+    """Read a point and its distance; chains have rows x, y, z, distance, changed."""
     return chain[i, 0], chain[i, 1], chain[i, 2], chain[i, 3]
 
 
 @njit(cache=True, nogil=True, inline="always")
-def put(chain: Any, i: int, bubble: Any, changed: float) -> None:
-    """Write a bubble."""
-    chain[i, 0], chain[i, 1], chain[i, 2] = bubble[0], bubble[1], bubble[2]
-    chain[i, 3], chain[i, 4] = bubble[3], changed
+def put(chain: Any, i: int, point: Any, changed: float) -> None:
+    """Write a point and its distance."""
+    chain[i, 0], chain[i, 1], chain[i, 2] = point[0], point[1], point[2]
+    chain[i, 3], chain[i, 4] = point[3], changed
 
 
 @njit(cache=True, nogil=True, inline="always")
 def apart(p: Any, q: Any) -> float:
-    """Distance between the centres of two bubbles."""
+    """Distance between two points."""
     x, y, z = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     return np.sqrt(x * x + y * y + z * z)
 
 
+@njit(cache=True, nogil=True, inline="always")
+def between(p: Any, q: Any, ratio: float) -> tuple[float, float, float]:
+    """Point on the way from one point to another."""
+    return (
+        p[0] + ratio * (q[0] - p[0]),
+        p[1] + ratio * (q[1] - p[1]),
+        p[2] + ratio * (q[2] - p[2]),
+    )
+
+
 @njit(cache=True, nogil=True)
-def pushed_out(x: float, y: float, z: float, packed: Any) -> tuple[float, float, float, float]:
-    """Return the bubble at a point, moved out of obstacles as far as the clearance asks."""
+def pushed_out(place: Any, clearance: float, packed: Any) -> tuple[float, float, float, float]:
+    """Return a point with its distance, moved out of obstacles as far as asked."""
+    x, y, z = place[0], place[1], place[2]
     d, index = nearest_obstacle(x, y, z, packed)
     for _ in range(8):
-        if d >= CLEARANCE:
+        if d >= clearance:
             break
         gx, gy, gz = gradient(x, y, z, packed[index])
-        step = CLEARANCE + _MARGIN - d
+        step = clearance + _MARGIN - d
         x, y, z = x + step * gx, y + step * gy, z + step * gz
         d, index = nearest_obstacle(x, y, z, packed)
     return x, y, z, d
 
 
 @njit(cache=True, nogil=True)
-def triangle_covered(a: Any, b: Any, c: Any) -> bool:
-    """Say whether three bubbles cover the triangle between them, whose edges they cover.
+def blocked_at(p: Any, q: Any, way: Any, at_p: float, at_q: float, packed: Any) -> float:
+    """Say how far along a segment its bubbles leave it uncovered; -1 if nowhere.
 
-    They leave a hole only around the point of equal power, where it lies in the triangle.
+    The segment came here by ``way`` times a number that goes from ``at_p`` to ``at_q`` along
+    it. A bubble holds the ways of all its points if it is larger by as much. Nearer than the
+    floor a segment may not get nearer still.
     """
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    uu, vv = ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz
-    uv = ux * vx + uy * vy + uz * vz
-    det = uu * vv - uv * uv
-    if det <= 1e-12 * uu * vv:
-        return True
-    ra = a[3] * a[3]
-    p, q = 0.5 * (uu + ra - b[3] * b[3]), 0.5 * (vv + ra - c[3] * c[3])
-    s, t = (p * vv - q * uv) / det, (q * uu - p * uv) / det
-    if s <= 0.0 or t <= 0.0 or s + t >= 1.0:
-        return True
-    return s * s * uu + t * t * vv + 2.0 * s * t * uv <= ra
+    length = apart(p, q)
+    if length <= 0.0:
+        return -1.0
+    swept = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+    slope = (at_q - at_p) / length
+    shrink = 1.0 / (1.0 + swept * abs(slope))
+    end = length - max(0.0, (q[3] - swept * at_q) * shrink)
+    t, d = 0.0, p[3]
+    for _ in range(_MAX_BUBBLES):
+        part = at_p + slope * t
+        bubble = (d - swept * part) * shrink
+        if bubble < _MIN_BUBBLE:
+            break
+        t += bubble
+        if t >= end:
+            return -1.0
+        x, y, z = between(p, q, t / length)
+        d = distance(x, y, z, packed)
+        if d < FLOOR:
+            part = at_p + slope * t
+            x, y, z = x - part * way[0], y - part * way[1], z - part * way[2]
+            if d < distance(x, y, z, packed):
+                break
+    return min(1.0, t / length)
 
 
 @njit(cache=True, nogil=True)
-def link(last: Any, target: Any, gap: float, packed: Any) -> tuple[float, float, float, float]:
-    """Return a bubble on the way to a target that overlaps the last one, or one too small."""
-    # So far away, any bubble that keeps the clearance overlaps the last one; but around a
-    # corner it is pushed aside, and has to be sought nearer.
-    ratio = min(0.9, (last[3] + CLEARANCE - OVERLAP) / gap)
-    for _ in range(_MAX_HALVINGS):
-        bubble = pushed_out(
-            last[0] + ratio * (target[0] - last[0]),
-            last[1] + ratio * (target[1] - last[1]),
-            last[2] + ratio * (target[2] - last[2]),
-            packed,
-        )
-        if bubble[3] >= CLEARANCE and apart(last, bubble) + OVERLAP <= last[3] + bubble[3]:
-            return bubble
-        ratio *= 0.5
-    return last[0], last[1], last[2], -1.0
+def bent_blocked_at(before: Any, old: Any, new: Any, after: Any, packed: Any) -> float:
+    """Say where the segments at a point that moved are blocked; -1 if nowhere.
 
-
-@njit(cache=True, nogil=True)
-def fill(chain: Any, n: int, target: Any, packed: Any) -> int:
-    """Append bubbles to a chain of ``n`` until it overlaps ``target``; -1 if that fails."""
-    for _ in range(_MAX_FILL):
-        last = bubble_at(chain, n - 1)
-        gap = apart(last, target)
-        if gap + OVERLAP <= last[3] + target[3]:
-            return n
-        if n >= chain.shape[0] - 1:
-            return -1
-        bubble = link(last, target, gap, packed)
-        if bubble[3] < CLEARANCE:
-            return -1
-        put(chain, n, bubble, 1.0)
-        n += 1
-    return -1
-
-
-@njit(cache=True, nogil=True)
-def sweeps_free_space(chain: Any, first: int, n: int, old: Any, following: Any) -> bool:
-    """Say whether the band may move from ``old`` to chain[first:n] without a jump."""
-    before = bubble_at(chain, first)
-    for i in range(first + 1, n + 1):
-        after = bubble_at(chain, i) if i < n else following
-        if i < n and apart(old, after) > old[3] + after[3]:
-            return False
-        if not triangle_covered(before, old, after):
-            return False
-        before = after
-    return True
-
-
-@njit(cache=True, nogil=True)
-def replace(chain: Any, n: int, old: Any, new: Any, following: Any, packed: Any) -> int:
-    """Append ``new`` in place of ``old``, and what links it to its neighbours.
-
-    Returns the chain's new length, or -1 if the band would get longer, break or jump.
+    Up to 1 it is on the segment before the point, from 1 on the one after it.
     """
-    first = n - 1
-    before = bubble_at(chain, first)
-    length = apart(before, old) + apart(old, following) - _MIN_GAIN
-    if apart(before, new) + apart(new, following) >= length:
-        return -1
-    n = fill(chain, n, new, packed)
-    if n < 0:
-        return -1
-    put(chain, n, new, 1.0)
-    n = fill(chain, n + 1, following, packed)
-    if n < 0:
-        return -1
-    for i in range(first, n - 1):
-        length -= apart(bubble_at(chain, i), bubble_at(chain, i + 1))
-    if length <= apart(bubble_at(chain, n - 1), following):
-        return -1
-    return n if sweeps_free_space(chain, first, n, old, following) else -1
+    way = new[0] - old[0], new[1] - old[1], new[2] - old[2]
+    blocked = blocked_at(before, new, way, 0.0, 1.0, packed)
+    if blocked >= 0.0:
+        return min(blocked, 0.999)
+    blocked = blocked_at(new, after, way, 1.0, 0.0, packed)
+    return 1.0 + blocked if blocked >= 0.0 else -1.0
 
 
 @njit(cache=True, nogil=True)
-def pull(before: Any, bubble: Any, after: Any, packed: Any) -> tuple[float, float, float]:
-    """Return the way from a bubble to the chord of its neighbours, along what it touches."""
-    cx, cy, cz = after[0] - before[0], after[1] - before[1], after[2] - before[2]
-    wx, wy, wz = bubble[0] - before[0], bubble[1] - before[1], bubble[2] - before[2]
-    square = cx * cx + cy * cy + cz * cz
-    t = 0.0
-    if square > 0.0:
-        t = min(1.0, max(0.0, (wx * cx + wy * cy + wz * cz) / square))
-    x, y, z = t * cx - wx, t * cy - wy, t * cz - wz
-    if bubble[3] < CLEARANCE + TOLERANCE:
-        _, gx, gy, gz = distance_and_gradient(bubble[0], bubble[1], bubble[2], packed)
+def pull(before: Any, point: Any, after: Any, packed: Any) -> tuple[float, float, float]:
+    """Return the way on which a point shortens the band most, along what it touches.
+
+    It is the sum of the directions to its neighbours, as long as Newton's method makes it:
+    in free space it ends on their chord.
+    """
+    a, b = apart(before, point), apart(point, after)
+    if a <= 0.0 or b <= 0.0:
+        return 0.0, 0.0, 0.0
+    x, y, z = between(before, after, a / (a + b))
+    x, y, z = x - point[0], y - point[1], z - point[2]
+    if point[3] < CLEARANCE + _CONTACT:
+        _, gx, gy, gz = distance_and_gradient(point[0], point[1], point[2], packed)
         inward = min(0.0, x * gx + y * gy + z * gz)
         x, y, z = x - inward * gx, y - inward * gy, z - inward * gz
     return x, y, z
 
 
 @njit(cache=True, nogil=True)
-def move(
-    chain: Any, n: int, bubble: Any, after: Any, packed: Any, moved_at_least: float
-) -> tuple[int, bool]:
-    """Append a bubble, pulled towards the chord; return the new length and whether it moved."""
-    x, y, z = pull(bubble_at(chain, n - 1), bubble, after, packed)
-    way = np.sqrt(x * x + y * y + z * z)
-    if way > moved_at_least:
-        scale = min(1.0, _STEP_FACTOR * bubble[3] / way)
-        for _ in range(2):
-            new = pushed_out(
-                bubble[0] + scale * x, bubble[1] + scale * y, bubble[2] + scale * z, packed
-            )
-            if new[3] >= CLEARANCE:
-                end = replace(chain, n, bubble, new, after, packed)
-                if end > 0:
-                    moved = end > n + 1 or apart(bubble, new) > moved_at_least
-                    chain[end - 1, 4] = 1.0 if moved else 0.0
-                    return end, moved
-            scale *= 0.5
-    put(chain, n, bubble, 0.0)
+def removable(before: Any, point: Any, after: Any, packed: Any) -> bool:
+    """Say whether the band may cut straight from one neighbour of a point to the other."""
+    a, b = apart(before, point), apart(point, after)
+    if a <= 0.0 or b <= 0.0:
+        return True
+    x, y, z = between(before, after, a / (a + b))
+    middle = x, y, z, distance(x, y, z, packed)
+    if middle[3] < min(FLOOR, point[3]) or middle[3] - apart(point, middle) < _MIN_BUBBLE:
+        return False
+    return bent_blocked_at(before, point, middle, after, packed) < 0.0
+
+
+@njit(cache=True, nogil=True)
+def bent_segment(p: Any, q: Any, ratio: float, packed: Any) -> tuple[float, float, float, float]:
+    """Return a point of a segment, pushed out to the clearance; its distance is -1 if it cannot."""
+    place = between(p, q, ratio)
+    point = pushed_out(place, CLEARANCE, packed)
+    if point[3] >= CLEARANCE and bent_blocked_at(p, place, point, q, packed) < 0.0:
+        return point
+    return place[0], place[1], place[2], -1.0
+
+
+@njit(cache=True, nogil=True)
+def moved_by(point: Any, way: Any, scale: float, packed: Any) -> tuple[float, float, float, float]:
+    """Return a point moved along a way, but not nearer to obstacles than it may be."""
+    far = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+    if far > _STEP_FACTOR * point[3]:
+        scale *= _STEP_FACTOR * point[3] / far
+    place = point[0] + scale * way[0], point[1] + scale * way[1], point[2] + scale * way[2]
+    return pushed_out(place, min(CLEARANCE, point[3]), packed)
+
+
+@njit(cache=True, nogil=True)
+def slide(
+    before: Any, tried: Any, after: Any, way: Any, blocked: float, packed: Any
+) -> tuple[float, float, float]:
+    """Take from a way what presses a segment against the obstacle that blocks it."""
+    if blocked < 1.0:
+        x, y, z = between(before, tried, blocked)
+    else:
+        x, y, z = between(tried, after, blocked - 1.0)
+    _, gx, gy, gz = distance_and_gradient(x, y, z, packed)
+    inward = _SLIDE_FACTOR * min(0.0, way[0] * gx + way[1] * gy + way[2] * gz)
+    return way[0] - inward * gx, way[1] - inward * gy, way[2] - inward * gz
+
+
+@njit(cache=True, nogil=True)
+def bend_and_move(
+    chain: Any, n: int, point: Any, new: Any, after: Any, blocked: float, packed: Any
+) -> int:
+    """Move a point one of whose segments is blocked, and bend that segment there."""
+    before = point_at(chain, n - 1)
+    length = apart(before, point) + apart(point, after) - _MIN_GAIN
+    if blocked < 1.0:
+        bend = bent_segment(before, point, blocked, packed)
+        bent = apart(before, bend) + apart(bend, new) + apart(new, after)
+        first, second, start, end = bend, new, bend, after
+    else:
+        bend = bent_segment(point, after, blocked - 1.0, packed)
+        bent = apart(before, new) + apart(new, bend) + apart(bend, after)
+        first, second, start, end = new, bend, before, bend
+    if bend[3] < 0.0 or bent >= length:
+        return -1
+    if bent_blocked_at(start, point, new, end, packed) >= 0.0:
+        return -1
+    put(chain, n, first, 1.0)
+    put(chain, n + 1, second, 1.0)
+    return n + 2
+
+
+@njit(cache=True, nogil=True)
+def try_way(
+    chain: Any, n: int, point: Any, after: Any, way: Any, packed: Any
+) -> tuple[int, float, Any]:
+    """Append a point moved along a way, as far as it shortens the band and is not blocked.
+
+    Returns the chain's new length or -1, where a segment was blocked last and by which move.
+    """
+    before = point_at(chain, n - 1)
+    length = apart(before, point) + apart(point, after) - _MIN_GAIN
+    scale, blocked, tried = 1.0, -1.0, point
+    for _ in range(_N_TRIES):
+        new = moved_by(point, way, scale, packed)
+        scale *= 0.5
+        sweep = apart(point, new)
+        if sweep <= _MIN_MOVE:
+            break
+        if new[3] < min(CLEARANCE, point[3]) or apart(before, new) + apart(new, after) >= length:
+            continue
+        blocked, tried = bent_blocked_at(before, point, new, after, packed), new
+        if blocked < 0.0:
+            put(chain, n, new, 1.0)
+            return n + 1, blocked, tried
+    return -1, blocked, tried
+
+
+@njit(cache=True, nogil=True)
+def move(chain: Any, n: int, point: Any, after: Any, packed: Any) -> tuple[int, bool]:
+    """Append a point, pulled taut; return the chain's new length and whether it moved."""
+    before = point_at(chain, n - 1)
+    way = pull(before, point, after, packed)
+    end, blocked, tried = try_way(chain, n, point, after, way, packed)
+    if end < 0 and blocked >= 0.0:
+        end = bend_and_move(chain, n, point, tried, after, blocked, packed)
+    for _ in range(_N_SLIDES):
+        if end > 0 or blocked < 0.0:
+            break
+        way = slide(before, tried, after, way, blocked, packed)
+        end, blocked, tried = try_way(chain, n, point, after, way, packed)
+    if end > 0:
+        return end, True
+    put(chain, n, point, 0.0)
     return n + 1, False
 
 
 @njit(cache=True, nogil=True)
-def removable(before: Any, bubble: Any, after: Any) -> bool:
-    """Say whether the band may cut straight from one neighbour of a bubble to the other."""
-    if _REMOVAL_FACTOR * apart(before, after) + OVERLAP > before[3] + after[3]:
-        return False
-    return triangle_covered(before, bubble, after)
+def sweep(source: Any, n: int, chain: Any, packed: Any) -> tuple[int, bool]:
+    """Contract the band once, from its last point to its first, which reverses it.
 
-
-@njit(cache=True, nogil=True)
-def sweep(source: Any, n: int, chain: Any, packed: Any, moved_at_least: float) -> tuple[int, bool]:
-    """Contract the band once, from its last bubble to its first, which reverses it.
-
-    Bubbles whose neighbourhood did not change since their last turn are left alone.
+    Points whose neighbourhood did not change since their last turn are left alone.
     """
-    put(chain, 0, bubble_at(source, n - 1), 0.0)
+    put(chain, 0, point_at(source, n - 1), 0.0)
     m, changed_before, any_changed = 1, source[n - 1, 4] > 0.0, False
     for i in range(n - 2, 0, -1):
-        if m + 2 * _MAX_FILL + 2 > chain.shape[0]:
+        if m + 3 > chain.shape[0]:
             return -1, False
-        bubble, after = bubble_at(source, i), bubble_at(source, i - 1)
+        point, after = point_at(source, i), point_at(source, i - 1)
         if not (changed_before or source[i, 4] > 0.0 or source[i - 1, 4] > 0.0):
-            put(chain, m, bubble, 0.0)
+            put(chain, m, point, 0.0)
             m += 1
-        elif removable(bubble_at(chain, m - 1), bubble, after):
+        elif removable(point_at(chain, m - 1), point, after, packed):
             chain[m - 1, 4] = 1.0
             changed_before, any_changed = True, True
         else:
-            m, changed_before = move(chain, m, bubble, after, packed, moved_at_least)
+            m, changed_before = move(chain, m, point, after, packed)
             any_changed = any_changed or changed_before
-    put(chain, m, bubble_at(source, 0), 0.0)
+    put(chain, m, point_at(source, 0), 0.0)
     return m + 1, any_changed
 
 
 @njit(cache=True, nogil=True)
 def contract(chain: Any, spare: Any, n: int, packed: Any, max_sweeps: int) -> int:
-    """Pull a band taut in place; return its number of bubbles, or -1 without room for them.
+    """Pull a band taut in place; return its number of points, or -1 without room for them.
 
     Sweeps come in pairs, one from either end.
     """
     for _ in range((max_sweeps + 1) // 2):
-        n, changed = sweep(chain, n, spare, packed, 0.1 * TOLERANCE)
+        n, changed = sweep(chain, n, spare, packed)
         if n < 0:
             return -1
-        n, changed_back = sweep(spare, n, chain, packed, 0.1 * TOLERANCE)
+        n, changed_back = sweep(spare, n, chain, packed)
         if n < 0 or not (changed or changed_back):
             break
     return n
@@ -256,27 +310,44 @@ def contract(chain: Any, spare: Any, n: int, packed: Any, max_sweeps: int) -> in
 
 @njit(cache=True, nogil=True)
 def start_chain(chain: Any, x: float, y: float, z: float, packed: Any) -> int:
-    """Start a chain with the bubble of a gripper; -1 if the gripper is in collision."""
-    radius = distance(x, y, z, packed)
-    put(chain, 0, (x, y, z, radius), 1.0)
-    return 1 if radius >= CLEARANCE else -1
+    """Start a chain with a gripper's position; -1 if the gripper is in collision."""
+    d = distance(x, y, z, packed)
+    put(chain, 0, (x, y, z, d), 1.0)
+    return 1 if d >= CLEARANCE else -1
 
 
 @njit(cache=True, nogil=True)
-def lengthen(chain: Any, n: int, x: float, y: float, z: float, packed: Any) -> int:
-    """Link a chain to one more point that keeps the clearance; -1 if that fails."""
+def append(chain: Any, n: int, x: float, y: float, z: float, packed: Any) -> int:
+    """Append a point that is known to be linked to the last one."""
+    put(chain, n, (x, y, z, distance(x, y, z, packed)), 1.0)
+    return n + 1
+
+
+@njit(cache=True, nogil=True)
+def link(chain: Any, n: int, x: float, y: float, z: float, packed: Any) -> int:
+    """Append a point, pushed out, and what it takes to get there; -1 if that fails."""
     if n < 0:
         return n
-    bubble = pushed_out(x, y, z, packed)
-    if bubble[3] < CLEARANCE:
+    target = pushed_out((x, y, z), CLEARANCE, packed)
+    if target[3] < CLEARANCE:
         return -1
-    if apart(bubble_at(chain, n - 1), bubble) < 1e-12:
-        return n
-    n = fill(chain, n, bubble, packed)
-    if n < 0 or n >= chain.shape[0]:
-        return -1
-    put(chain, n, bubble, 1.0)
-    return n + 1
+    for _ in range(_MAX_LINKS):
+        last = point_at(chain, n - 1)
+        if apart(last, target) < 1e-12:
+            return n
+        if n + 1 >= chain.shape[0]:
+            return -1
+        ratio, bend = 1.0, target
+        while ratio > 0.05 and blocked_at(last, bend, _NO_WAY, 0.0, 0.0, packed) >= 0.0:
+            ratio *= 0.5
+            bend = pushed_out(between(last, target, ratio), CLEARANCE, packed)
+        if ratio <= 0.05 or bend[3] < CLEARANCE:
+            return -1
+        put(chain, n, bend, 1.0)
+        n += 1
+        if ratio == 1.0:
+            return n
+    return -1
 
 
 @njit(cache=True, nogil=True)
@@ -297,7 +368,7 @@ def chain_length(chain: Any, n: int) -> float:
     """Length of a band."""
     total = 0.0
     for i in range(n - 1):
-        total += apart(bubble_at(chain, i), bubble_at(chain, i + 1))
+        total += apart(point_at(chain, i), point_at(chain, i + 1))
     return total
 
 
@@ -321,12 +392,14 @@ def propagate_row(
     bx, by, bz = row[3] + command[3], row[4] + command[4], row[5] + command[5]
     if (bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2 > max_length * max_length:
         return False
-    n = start_chain(chain, ax, ay, az, packed)
-    for i in range(n_points(row)):
-        n = lengthen(chain, n, row[6 + 3 * i], row[7 + 3 * i], row[8 + 3 * i], packed)
+    # The old ends become points between the new ones.
+    n, m = start_chain(chain, ax, ay, az, packed), n_points(row)
+    n = link(chain, n, row[6], row[7], row[8], packed)
     if n < 0 or distance(bx, by, bz, packed) < CLEARANCE:
         return False
-    n = lengthen(chain, n, bx, by, bz, packed)
+    for i in range(1, m):
+        n = append(chain, n, row[6 + 3 * i], row[7 + 3 * i], row[8 + 3 * i], packed)
+    n = link(chain, n, bx, by, bz, packed)
     if n < 0:
         return False
     n = contract(chain, spare, n, packed, 100)
@@ -356,7 +429,7 @@ def reduce_points(points: Any, packed: Any, workspace: Any, out: Any) -> int:
     chain, last = workspace[0], points.shape[0] - 1
     n = start_chain(chain, points[0, 0], points[0, 1], points[0, 2], packed)
     for i in range(1, last + 1):
-        n = lengthen(chain, n, points[i, 0], points[i, 1], points[i, 2], packed)
+        n = link(chain, n, points[i, 0], points[i, 1], points[i, 2], packed)
     if n < 0 or distance(points[last, 0], points[last, 1], points[last, 2], packed) < CLEARANCE:
         return -1
     n = contract(chain, workspace[1], n, packed, 300)

@@ -90,9 +90,7 @@ def test_without_obstacles_everything_is_far_away():
     assert (gradient == 0.0).all()
 
 
-@pytest.mark.parametrize(
-    "p", [(0.0, 0.0, 0.0), (0.2, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.3)]
-)
+@pytest.mark.parametrize("p", [(0.0, 0.0, 0.0), (0.2, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.3)])
 def test_gradients_are_finite_where_directions_are_ambiguous(p):
     for each in (
         Box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1)),

@@ -51,7 +51,7 @@ def test_there_are_the_papers_seven_scenes():
 
 
 def test_an_unknown_name_is_answered_with_the_known_ones():
-    with pytest.raises(ValueError, match="simple_hook_short.*engine_assembly.*'hook'"):
+    with pytest.raises(ValueError, match=r"simple_hook_short.*engine_assembly.*'hook'"):
         load_scene("hook")
 
 
