@@ -66,9 +66,7 @@ def first_of_each(rope: Rope, problem: Problem, n_plans: int) -> dict[bool, Tria
     found: dict[bool, Trial] = {}
     start = rope.reduce(problem.start)
     for seed in range(n_plans):
-        planner = BiasedRRT(
-            rope, max_iterations=10**6, time_limit=TIME_LIMIT, random_state=seed
-        )
+        planner = BiasedRRT(rope, max_iterations=10**6, time_limit=TIME_LIMIT, random_state=seed)
         plan = planner.plan(start, problem.goal)
         if not plan.success:
             print(f"seed {seed}: {plan.status.value}")

@@ -76,12 +76,12 @@ class Transitions:
 
     @property
     def reduced(self) -> NDArray[np.float64]:
-        """b of each transition, shape (n, reduced_dim)."""
+        """The states b of each transition, shape (n, reduced_dim)."""
         return self._states.unpack(self._first)
 
     @property
     def next_reduced(self) -> NDArray[np.float64]:
-        """b' of each transition, shape (n, reduced_dim)."""
+        """The states b' of each transition, shape (n, reduced_dim)."""
         return self._states.unpack(self._first + 1)
 
     @property

@@ -100,7 +100,9 @@ def count_components(cells: Any, n: int, m: int, stack: Any) -> tuple[int, int]:
 
 
 @njit(cache=True, nogil=True)
-def fill_components(rows: Any, packed: Any, length: float, cells: Any, stack: Any, out: Any) -> None:
+def fill_components(
+    rows: Any, packed: Any, length: float, cells: Any, stack: Any, out: Any
+) -> None:
     """Write the numbers of free and occupied parts of each row's slice."""
     for i in range(rows.shape[0]):
         n, m = fill_slice(rows[i], packed, length, cells)

@@ -70,7 +70,12 @@ def test_bands_come_back_bit_by_bit_and_take_little_room(rng, tmp_path):
     whole = Transitions.concatenate(
         [
             Transitions(
-                rows[:-1], np.zeros((40, 6)), rows[1:], np.ones(40, int), np.full(40, i), np.arange(40)
+                rows[:-1],
+                np.zeros((40, 6)),
+                rows[1:],
+                np.ones(40, int),
+                np.full(40, i),
+                np.arange(40),
             )
             for i, rows in enumerate(plans)
         ]
@@ -78,7 +83,11 @@ def test_bands_come_back_bit_by_bit_and_take_little_room(rng, tmp_path):
     before = np.concatenate([rows[:-1] for rows in plans])
     after = np.concatenate([rows[1:] for rows in plans])
     chosen = rng.permutation(200)[:77]
-    for some, index in ((whole, np.arange(200)), (whole[chosen], chosen), (whole[::-1], np.s_[::-1])):
+    for some, index in (
+        (whole, np.arange(200)),
+        (whole[chosen], chosen),
+        (whole[::-1], np.s_[::-1]),
+    ):
         np.testing.assert_array_equal(some.reduced, before[index])
         np.testing.assert_array_equal(some.next_reduced, after[index])
         some.save(tmp_path / "some.npz")
