@@ -115,7 +115,8 @@ class CarriedShortcuts:
 
     def _go_straight(self, start: Array, target: Array, most_steps: int) -> Path | None:
         """Go straight to a configuration; None if that is not allowed or takes too long."""
-        states, commands = [start], []
+        states: list[Array] = [start]
+        commands: list[Array] = []
         while not self._arrived(states[-1], target):
             if len(commands) == most_steps:
                 return None
@@ -131,7 +132,8 @@ class CarriedShortcuts:
 
         Returns what was gone and how many transitions of the path that replaces.
         """
-        states, commands = [start], []
+        states: list[Array] = [start]
+        commands: list[Array] = []
         for i in range(index, len(path.commands)):
             if np.array_equal(states[-1], path.reduced[i]):
                 break

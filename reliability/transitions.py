@@ -185,5 +185,5 @@ def _check_lengths(reduced: Any, *others: Any) -> None:
 
 def _first_states(follows_on: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Index of the state that each transition begins in; it ends in the next."""
-    ends = np.cumsum(~follows_on) - ~follows_on
-    return np.arange(len(follows_on)) + ends
+    n_ends: NDArray[np.int64] = np.cumsum(~follows_on) - ~follows_on
+    return np.arange(len(follows_on)) + n_ends
