@@ -33,7 +33,7 @@ class Found:
     status : PlanStatus
     reduced : ndarray of shape (T + 1, reduced_dim)
     commands : ndarray of shape (T, command_dim)
-    tree : ndarray of shape (n_edges, 2, reduced_dim)
+    tree : ndarray of shape (n_edges, 2, configuration_dim)
     simplification_time : float
         Seconds of the search's duration that went into making the plan shorter.
     """

@@ -74,8 +74,7 @@ class LockstepRRT:
         return self._system.steer(start, start[:, : self._system.configuration_dim])[:0]
 
     def _sample(self, n: int) -> Array:
-        low, high = self._system.bounds
-        samples = self._rng.uniform(low, high, size=(n, len(low)))
+        samples = self._system.sample_configurations(self._rng, n)
         to_goal = self._rng.random(n) < GOAL_BIAS
         chosen = self._rng.integers(len(self._goals), size=int(to_goal.sum()))
         samples[to_goal] = self._goals[chosen]

@@ -51,8 +51,8 @@ class PlanResult:
         Unreliable transitions that were not accepted.
     n_accepted_unreliable : int
         Unreliable transitions that were accepted by a draw.
-    tree : ndarray of shape (n_edges, 2, reduced_dim)
-        Accepted edges, in the direction of execution.
+    tree : ndarray of shape (n_edges, 2, configuration_dim)
+        Configurations of accepted edges, in the direction of execution.
     random_state : int
         Seed that gives this result again.
     """

@@ -6,9 +6,11 @@ import time
 from typing import Any
 
 from planners.biased_planner import BiasedPlanner, Found, Search
+from planners.carried_shortcut import CarriedShortcuts, Path
 from planners.edge_checker import EdgeChecker
 from planners.lockstep_rrt import LockstepRRT
 from planners.ompl_search import search_as_planner
+from planners.result import PlanStatus
 from planners.shortcut import shorten
 from systems.system import Array, System
 from systems.validation import RandomState
@@ -84,8 +86,8 @@ class BiasedRRT(BiasedPlanner):
         )
         began = time.perf_counter()
         path, commands = rrt.path()
-        if self.simplify and self.system.configuration_dim == self.system.reduced_dim:
-            path, commands = self._shortened(path, search)
+        if self.simplify and status is PlanStatus.SOLVED:
+            path, commands = self._shortened(path, commands, search)
         return Found(
             status=status,
             reduced=path,
@@ -94,7 +96,11 @@ class BiasedRRT(BiasedPlanner):
             simplification_time=time.perf_counter() - began,
         )
 
-    def _shortened(self, path: Array, search: Search) -> tuple[Array, Array]:
+    def _shortened(self, path: Array, commands: Array, search: Search) -> tuple[Array, Array]:
+        if self.system.configuration_dim < self.system.reduced_dim:
+            shortcuts = CarriedShortcuts(self.system, search.goals, search.check, search.rng)
+            shortened = shortcuts.shorten(Path(path, commands))
+            return shortened.reduced, shortened.commands
         checker = EdgeChecker(self.system, search.check)
         shorter = shorten(path, checker, self.system.step_size, search.rng)
         return shorter, self.system.steer(shorter[:-1], shorter[1:])

@@ -61,9 +61,10 @@ class SearchTree:
         return np.array(indices[::-1])
 
     def edges(self) -> Array:
-        """Return (parent, child) pairs of reduced states, shape (n_edges, 2, reduced_dim)."""
+        """Return (parent, child) pairs of configurations, shape (n_edges, 2, configuration_dim)."""
         children = np.flatnonzero(self.parents >= 0)
-        return np.stack([self.reduced[self.parents[children]], self.reduced[children]], axis=1)
+        configurations = self.reduced[:, : self._dim]
+        return np.stack([configurations[self.parents[children]], configurations[children]], axis=1)
 
 
 @njit(cache=True, nogil=True)

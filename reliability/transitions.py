@@ -4,24 +4,32 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reliability.labels import RELIABLE, UNRELIABLE
+from reliability.packed_rows import PackedRows, as_bits
 from systems.archive import read_arrays, write_arrays
 from systems.system import System
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+
+_OTHERS = ("command", "next_reduced", "y", "plan", "step")
+_COLUMNS = ("command", "y", "plan", "step")
+_STATES = ("values", "lengths", "width")
+_DESCRIBED_AT_ONCE = 2**15
 
 
-@dataclass(frozen=True, eq=False)
 class Transitions:
     """Transitions of many executed plans, one per row.
 
-    Attributes
+    Reduced states are stored once where a transition begins in the state that the one before
+    ended in, and without a band's repeats of its last point; ``reduced`` and ``next_reduced``
+    are made when asked for. Select rows first where there are many.
+
+    Parameters
     ----------
     reduced : ndarray of shape (n, reduced_dim)
         b, as planned.
@@ -37,46 +45,81 @@ class Transitions:
         Position within its plan, from 0.
     """
 
-    reduced: NDArray[np.float64]
-    command: NDArray[np.float64]
-    next_reduced: NDArray[np.float64]
-    y: NDArray[np.int64]
-    plan: NDArray[np.int64]
-    step: NDArray[np.int64]
+    def __init__(
+        self,
+        reduced: NDArray[np.float64],
+        command: NDArray[np.float64],
+        next_reduced: NDArray[np.float64],
+        y: NDArray[np.int64],
+        plan: NDArray[np.int64],
+        step: NDArray[np.int64],
+    ) -> None:
+        _check_lengths(reduced, command, next_reduced, y, plan, step)
+        self.command, self.y, self.plan, self.step = command, y, plan, step
+        follows_on = np.zeros(len(reduced), dtype=np.bool_)
+        ends, starts = as_bits(next_reduced[:-1]), as_bits(reduced[1:])
+        follows_on[:-1] = (ends == starts).all(axis=1)
+        both = np.stack([reduced, next_reduced], axis=1)
+        kept = np.stack([np.ones_like(follows_on), ~follows_on], axis=1)
+        self._states = PackedRows.pack(both[kept])
+        self._first = _first_states(follows_on)
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            array = getattr(self, field.name)
-            n_dims = 2 if field.name in ("reduced", "command", "next_reduced") else 1
-            if not isinstance(array, np.ndarray) or array.ndim != n_dims:
-                raise ValueError(f"{field.name} must be an array of {n_dims} dimensions.")
-            if len(array) != len(self.reduced):
-                raise ValueError(
-                    f"{field.name} must have a row per transition, {len(self.reduced)}, "
-                    f"got {len(array)}."
-                )
+    @classmethod
+    def _of_states(
+        cls, states: PackedRows, first: NDArray[np.int64], columns: dict[str, NDArray[Any]]
+    ) -> Transitions:
+        made = cls.__new__(cls)
+        made._states, made._first = states, first
+        for name in _COLUMNS:
+            setattr(made, name, columns[name])
+        return made
+
+    @property
+    def reduced(self) -> NDArray[np.float64]:
+        """The states b of each transition, shape (n, reduced_dim)."""
+        return self._states.unpack(self._first)
+
+    @property
+    def next_reduced(self) -> NDArray[np.float64]:
+        """The states b' of each transition, shape (n, reduced_dim)."""
+        return self._states.unpack(self._first + 1)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that the transitions take up in memory."""
+        stored = (self._states.values, self._states.lengths, self._first)
+        columns = (getattr(self, name) for name in _COLUMNS)
+        return sum(array.nbytes for array in (*stored, *columns))
 
     def __len__(self) -> int:
-        return len(self.reduced)
+        return len(self._first)
 
     def __getitem__(self, rows: Any) -> Transitions:
         """Select rows by a slice, a mask or an array of indices."""
         index = np.arange(len(self))[rows]
         if index.ndim != 1:
             raise IndexError(f"Transitions are selected by slice, mask or array, got {rows!r}.")
-        return Transitions(*(getattr(self, field.name)[rows] for field in fields(self)))
+        first = self._first[index]
+        follows_on = np.zeros(len(index), dtype=np.bool_)
+        follows_on[:-1] = first[1:] == first[:-1] + 1
+        pairs = np.stack([first, first + 1], axis=1)
+        kept = np.stack([np.ones_like(follows_on), ~follows_on], axis=1)
+        columns = {name: getattr(self, name)[index] for name in _COLUMNS}
+        states = self._states.take(pairs[kept])
+        return self._of_states(states, _first_states(follows_on), columns)
 
     @classmethod
     def concatenate(cls, parts: Sequence[Transitions]) -> Transitions:
         """Join transitions end to end; plan ids are kept as they are."""
         if not parts:
             raise ValueError("parts must hold at least one Transitions, got none.")
-        return cls(
-            *(
-                np.concatenate([getattr(part, field.name) for part in parts])
-                for field in fields(cls)
-            )
-        )
+        states = PackedRows.concatenate([part._states for part in parts])
+        n_before = np.cumsum([0, *(len(part._states) for part in parts)])
+        first = [part._first + n for part, n in zip(parts, n_before[:-1], strict=True)]
+        columns = {
+            name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS
+        }
+        return cls._of_states(states, np.concatenate(first), columns)
 
     def features(self, system: System) -> NDArray[Any]:
         """Describe the transitions to an estimator, as ``system`` sees them.
@@ -85,7 +128,14 @@ class Transitions:
         -------
         X : ndarray of shape (n, n_features)
         """
-        return system.features(self.reduced, self.next_reduced)
+        starts = range(0, max(len(self), 1), _DESCRIBED_AT_ONCE)
+        parts = (self._first[i : i + _DESCRIBED_AT_ONCE] for i in starts)
+        return np.concatenate(
+            [
+                system.features(self._states.unpack(part), self._states.unpack(part + 1))
+                for part in parts
+            ]
+        )
 
     def first_mistakes(self) -> NDArray[np.bool_]:
         """Tell where execution and prediction part, from where they had already parted.
@@ -103,8 +153,9 @@ class Transitions:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file; whatever stood there is replaced only when all is written."""
-        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
-        write_arrays(path, arrays, format_version=FORMAT_VERSION)
+        arrays = {name: getattr(self, name) for name in _COLUMNS}
+        states = {name: getattr(self._states, name) for name in _STATES}
+        write_arrays(path, arrays | states | {"first": self._first}, format_version=FORMAT_VERSION)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Transitions:
@@ -115,6 +166,24 @@ class Transitions:
         ValueError
             If the file is no such file, is truncated, or has another format version.
         """
-        names = {field.name for field in fields(cls)}
+        names = {"first", *_COLUMNS, *_STATES}
         arrays = read_arrays(path, names, format_version=FORMAT_VERSION, kind="transitions")
-        return cls(**arrays)
+        states = PackedRows(arrays["values"], arrays["lengths"], int(arrays["width"]))
+        return cls._of_states(states, arrays["first"], arrays)
+
+
+def _check_lengths(reduced: Any, *others: Any) -> None:
+    for name, array in zip(("reduced", *_OTHERS), (reduced, *others), strict=True):
+        n_dims = 2 if name in ("reduced", "command", "next_reduced") else 1
+        if not isinstance(array, np.ndarray) or array.ndim != n_dims:
+            raise ValueError(f"{name} must be an array of {n_dims} dimensions.")
+        if len(array) != len(reduced):
+            raise ValueError(
+                f"{name} must have a row per transition, {len(reduced)}, got {len(array)}."
+            )
+
+
+def _first_states(follows_on: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Index of the state that each transition begins in; it ends in the next."""
+    n_ends: NDArray[np.int64] = np.cumsum(~follows_on) - ~follows_on
+    return np.arange(len(follows_on)) + n_ends

@@ -10,12 +10,20 @@ from systems.system import Problem, Rollout, StopReason, System
 
 if TYPE_CHECKING:
     from systems.contract_checks import check_system
+    from systems.obstacles import Box, Capsule, Cylinder
     from systems.planar_arm import PlanarArm
+    from systems.rope import Rope
+    from systems.rope_scene import Scene
 
 __all__ = [
+    "Box",
+    "Capsule",
+    "Cylinder",
     "PlanarArm",
     "Problem",
     "Rollout",
+    "Rope",
+    "Scene",
     "SimulationDivergedError",
     "StopReason",
     "System",
@@ -23,7 +31,15 @@ __all__ = [
     "check_system",
 ]
 
-_HOMES = {"PlanarArm": "systems.planar_arm", "check_system": "systems.contract_checks"}
+_HOMES = {
+    "Box": "systems.obstacles",
+    "Capsule": "systems.obstacles",
+    "Cylinder": "systems.obstacles",
+    "PlanarArm": "systems.planar_arm",
+    "Rope": "systems.rope",
+    "Scene": "systems.rope_scene",
+    "check_system": "systems.contract_checks",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -35,6 +35,7 @@ def check_system(system: System, *, random_state: int = 0) -> None:
     """
     _check_attributes(system)
     _check_pickles(system)
+    _check_samples(system, random_state)
     problems = [_check_problem(system, random_state + i) for i in range(N_PROBLEMS)]
     starts = np.array([_check_reduce(system, problem.start) for problem in problems])
     rng = np.random.default_rng(random_state)
@@ -127,6 +128,18 @@ def _check_pickles(system: System) -> None:
             f"{type(system).__name__} does not pickle ({error}); leave simulators and other "
             "handles out of __getstate__ and start them when they are first needed."
         ) from error
+
+
+def _check_samples(system: System, seed: int) -> None:
+    samples, again = (
+        system.sample_configurations(np.random.default_rng(seed), N_ROWS) for _ in range(2)
+    )
+    _check_array(system, "sample_configurations", samples, (N_ROWS, system.configuration_dim))
+    if not np.array_equal(samples, again):
+        _fail(system, "sample_configurations", "must draw from nothing but the given generator.")
+    low, high = system.bounds
+    if not ((samples >= low) & (samples <= high)).all():
+        _fail(system, "sample_configurations", f"left the bounds: {samples.tolist()}.")
 
 
 def _check_problem(system: System, seed: int) -> Problem:

@@ -21,6 +21,8 @@ class StopReason(Enum):
 
     COMPLETED = "Every command was carried out."
     CONSTRAINT = "The system reached the boundary of a constraint and stopped there."
+    GRIPPER_CONTACT = "A gripper would have touched an obstacle and stopped before it."
+    OVERSTRETCHED = "The rope reached its largest allowed stretch and stopped there."
 
 
 @dataclass(frozen=True)
@@ -173,6 +175,23 @@ class System(ABC):
     @abstractmethod
     def sample_problem(self, random_state: RandomState = None) -> Problem:
         """Draw a start state and a goal."""
+
+    def sample_configurations(self, rng: np.random.Generator, n: int) -> Array:
+        """Draw configurations for :class:`planners.BiasedRRT` to grow towards.
+
+        Uniform within ``bounds``; override it where few of those make sense.
+
+        Parameters
+        ----------
+        rng : Generator
+        n : int
+
+        Returns
+        -------
+        configurations : ndarray of shape (n, configuration_dim)
+        """
+        low, high = self.bounds
+        return rng.uniform(low, high, size=(n, len(low)))
 
     @abstractmethod
     def goal_reached(self, reduced: Array, goal: Array) -> NDArray[np.bool_]:

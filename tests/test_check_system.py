@@ -70,6 +70,16 @@ class Raising(Disc):
         raise KeyError("threshold")
 
 
+class Wandering(Disc):
+    def sample_configurations(self, rng, n):
+        return super().sample_configurations(np.random.default_rng(), n)
+
+
+class Narrow(Disc):
+    def sample_configurations(self, rng, n):
+        return super().sample_configurations(rng, n)[:, :1]
+
+
 def changed(**attributes):
     return type("Changed", (Disc,), attributes | {"__reduce__": lambda self: (Disc, ())})()
 
@@ -83,6 +93,8 @@ def changed(**attributes):
         (changed(bounds=np.zeros((2, 3))), r"bounds must be an array of shape \(2, 2\)"),
         (changed(bounds=np.zeros((2, 2))), "bounds must be finite, lower < upper"),
         (changed(bounds=None), "bounds must be an array"),
+        (Wandering(), "sample_configurations must draw from nothing but the given"),
+        (Narrow(), r"sample_configurations must return an array of shape \(16, 2\)"),
         (Unpicklable(), "does not pickle .* leave simulators"),
         (InPlace(), "propagate changed its arguments in place"),
         (Restless(), "features gave two results for the same arguments"),

@@ -37,3 +37,11 @@ def test_arm_example_gives_its_table_and_pictures(tmp_path):
     again = run(script, *options, cwd=tmp_path)
     tables = [text[text.index("Held-out") : text.index("Starts at")] for text in (shown, again)]
     assert tables[0] == tables[1], "the same seeds, the same models"
+
+
+def test_rope_example_shows_a_plan_that_got_caught(tmp_path):
+    options = ("engine_assembly", "--size", 160, 120, "--out", tmp_path)
+    shown = run(ROOT / "examples" / "rope.py", *options, cwd=tmp_path)
+    assert "stopped there" in shown
+    pictures = {file.name for file in (tmp_path / "engine_assembly").iterdir()}
+    assert {"caught.png", "caught.gif"} <= pictures

@@ -18,8 +18,15 @@ def transitions(rng):
     )
 
 
+NAMES = ("reduced", "command", "next_reduced", "y", "plan", "step")
+
+
+def arrays_of(transitions):
+    return {name: getattr(transitions, name) for name in NAMES}
+
+
 def assert_equal(one, other):
-    for name in vars(one):
+    for name in NAMES:
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
@@ -48,6 +55,55 @@ def test_files_give_back_what_was_saved(transitions, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["some.npz"]
 
 
+def band_rows(rng, n_rows, n_points=20):
+    """Rows of gripper positions and points, of which the last is repeated."""
+    rows = np.zeros((n_rows, 6 + 3 * n_points))
+    for row in rows:
+        points = rng.normal(size=(rng.integers(2, n_points + 1), 3))
+        points = np.vstack([points, np.tile(points[-1], (n_points - len(points), 1))])
+        row[:] = [*points[0], *points[-1], *points.ravel()]
+    return rows
+
+
+def test_bands_come_back_bit_by_bit_and_take_little_room(rng, tmp_path):
+    plans = [band_rows(rng, 41) for _ in range(5)]
+    whole = Transitions.concatenate(
+        [
+            Transitions(
+                rows[:-1],
+                np.zeros((40, 6)),
+                rows[1:],
+                np.ones(40, int),
+                np.full(40, i),
+                np.arange(40),
+            )
+            for i, rows in enumerate(plans)
+        ]
+    )
+    before = np.concatenate([rows[:-1] for rows in plans])
+    after = np.concatenate([rows[1:] for rows in plans])
+    chosen = rng.permutation(200)[:77]
+    for some, index in (
+        (whole, np.arange(200)),
+        (whole[chosen], chosen),
+        (whole[::-1], np.s_[::-1]),
+    ):
+        np.testing.assert_array_equal(some.reduced, before[index])
+        np.testing.assert_array_equal(some.next_reduced, after[index])
+        some.save(tmp_path / "some.npz")
+        assert_equal(Transitions.load(tmp_path / "some.npz"), some)
+    assert whole.nbytes < 0.4 * (before.nbytes + after.nbytes)
+    assert len(whole[:0].reduced) == 0
+
+
+@pytest.mark.parametrize("width", [1, 2, 3, 4, 7])
+def test_short_rows_come_back(width, rng):
+    rows = rng.integers(2, size=(50, width)).astype(float) * -1.0
+    parts = Transitions(rows, rows, rows[::-1], *np.zeros((3, 50), int))
+    np.testing.assert_array_equal(parts.reduced.view(int), rows.view(int))
+    np.testing.assert_array_equal(parts.next_reduced, rows[::-1])
+
+
 def test_features_are_the_systems(arm, arm_transitions):
     expected = arm.features(arm_transitions.reduced, arm_transitions.next_reduced)
     np.testing.assert_array_equal(arm_transitions.features(arm), expected)
@@ -73,7 +129,7 @@ def test_truncated_files_are_refused(transitions, tmp_path, kept):
 
 def test_files_of_another_version_or_kind_are_refused(transitions, tmp_path):
     np.savez(tmp_path / "new.npz", format_version=np.array(99))
-    with pytest.raises(ValueError, match=r"format version 99 .* reads 1; make"):
+    with pytest.raises(ValueError, match=r"format version 99 .* reads 2; make"):
         Transitions.load(tmp_path / "new.npz")
     np.savez(tmp_path / "other.npz", x=np.zeros(3))
     with pytest.raises(ValueError, match="not a whole file of transitions"):
@@ -84,9 +140,9 @@ def test_files_of_another_version_or_kind_are_refused(transitions, tmp_path):
 
 def test_arrays_that_do_not_fit_are_refused(transitions):
     with pytest.raises(ValueError, match="y must have a row per transition, 6, got 5"):
-        Transitions(**vars(transitions) | {"y": transitions.y[:5]})
+        Transitions(**arrays_of(transitions) | {"y": transitions.y[:5]})
     with pytest.raises(ValueError, match="command must be an array of 2 dimensions"):
-        Transitions(**vars(transitions) | {"command": transitions.y})
+        Transitions(**arrays_of(transitions) | {"command": transitions.y})
 
 
 def test_labels_are_one_and_zero():

@@ -1,0 +1,164 @@
+"""Shortcuts for plans whose reduced states carry more than their configuration.
+
+What is carried depends on the way: after a shortcut, the rest of the plan has to be propagated
+again, and classified again wherever that made a difference.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planners.check_transition import CheckTransition
+from systems.system import Array, System
+
+ROUNDS = 200
+LONGEST_SHORTCUT = 40
+SMALLEST_SAVING = 1e-6
+# A share of the step: adding a displacement to a configuration rounds.
+ARRIVED = 1e-6
+CLASSIFIED_AT_ONCE = 16
+
+
+@dataclass(frozen=True)
+class Path:
+    """States and the commands between them.
+
+    Attributes
+    ----------
+    reduced : ndarray of shape (T + 1, reduced_dim)
+    commands : ndarray of shape (T, command_dim)
+    """
+
+    reduced: Array
+    commands: Array
+
+
+class CarriedShortcuts:
+    """Makes plans shorter by straight lines, of which every transition is checked.
+
+    A shortcut is taken if g allows every transition of it and of the plan's rest, the plan still
+    ends in a goal, and every transition that is not bit by bit one of the old plan's is
+    classified Reliable. Nothing is drawn: a shortcut that is tried again and again until a draw
+    lets it pass would undo the bias.
+
+    Parameters
+    ----------
+    system : System
+    goals : ndarray of shape (n_goals, configuration_dim)
+    check : CheckTransition
+    rng : Generator
+    """
+
+    def __init__(
+        self, system: System, goals: Array, check: CheckTransition, rng: np.random.Generator
+    ) -> None:
+        self._system = system
+        self._dim = system.configuration_dim
+        self._goals = goals
+        self._check = check
+        self._rng = rng
+
+    def shorten(self, path: Path) -> Path:
+        """Take shortcuts between random states of a plan.
+
+        Parameters
+        ----------
+        path : Path
+            Ends in a goal.
+
+        Returns
+        -------
+        shortened : Path
+            From the same start, in no more transitions.
+        """
+        for _ in range(ROUNDS):
+            if len(path.commands) < 2:
+                break
+            first, last = self._propose(len(path.reduced))
+            if self._saving(path, first, last) > SMALLEST_SAVING:
+                path = self._with_shortcut(path, first, last) or path
+        return path
+
+    def _propose(self, n_states: int) -> tuple[int, int]:
+        first = int(self._rng.integers(n_states - 2))
+        length = int(self._rng.integers(2, LONGEST_SHORTCUT + 1))
+        return first, min(first + length, n_states - 1)
+
+    def _saving(self, path: Path, first: int, last: int) -> float:
+        corners = path.reduced[first : last + 1, : self._dim]
+        travelled = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()
+        return float(travelled - np.linalg.norm(corners[-1] - corners[0]))
+
+    def _with_shortcut(self, path: Path, first: int, last: int) -> Path | None:
+        """Return the plan with one shortcut, or None where that may not be taken."""
+        start, target = path.reduced[first], path.reduced[last, : self._dim]
+        straight = self._go_straight(start, target, last - first)
+        if straight is None or not self._all_reliable(straight):
+            return None
+        rest = self._follow(straight.reduced[-1], path, last)
+        if rest is None:
+            return None
+        followed, n_followed = rest
+        if not self._all_reliable(followed):
+            return None
+        kept = last + n_followed
+        reduced = [path.reduced[:first], straight.reduced, followed.reduced[1:]]
+        commands = [path.commands[:first], straight.commands, followed.commands]
+        joined = Path(
+            np.concatenate([*reduced, path.reduced[kept + 1 :]]),
+            np.concatenate([*commands, path.commands[kept:]]),
+        )
+        arrives = self._system.goal_reached(joined.reduced[-1:], self._goals)[0]
+        return joined if arrives else None
+
+    def _go_straight(self, start: Array, target: Array, most_steps: int) -> Path | None:
+        """Go straight to a configuration; None if that is not allowed or takes too long."""
+        states: list[Array] = [start]
+        commands: list[Array] = []
+        while not self._arrived(states[-1], target):
+            if len(commands) == most_steps:
+                return None
+            step = self._step(states[-1], target)
+            if step is None:
+                return None
+            commands.append(step[0])
+            states.append(step[1])
+        return Path(np.array(states), np.array(commands))
+
+    def _follow(self, start: Array, path: Path, index: int) -> tuple[Path, int] | None:
+        """Go where a path goes from ``index`` on, until all is as on the path.
+
+        Returns what was gone and how many transitions of the path that replaces.
+        """
+        states: list[Array] = [start]
+        commands: list[Array] = []
+        for i in range(index, len(path.commands)):
+            if np.array_equal(states[-1], path.reduced[i]):
+                break
+            target = path.reduced[i + 1, : self._dim]
+            step = self._step(states[-1], target)
+            if step is None or not self._arrived(step[1], target):
+                return None
+            commands.append(step[0])
+            states.append(step[1])
+        gone = np.reshape(commands, (len(commands), path.commands.shape[1]))
+        return Path(np.array(states), gone), len(commands)
+
+    def _step(self, state: Array, target: Array) -> tuple[Array, Array] | None:
+        command = self._system.steer(state[None], target[None])
+        following, valid = self._system.propagate(state[None], command)
+        return (command[0], following[0]) if valid[0] else None
+
+    def _arrived(self, state: Array, target: Array) -> bool:
+        gap = np.abs(state[: self._dim] - target).max()
+        return bool(gap <= ARRIVED * self._system.step_size)
+
+    def _all_reliable(self, path: Path) -> bool:
+        before, after = path.reduced[:-1], path.reduced[1:]
+        for i in range(0, len(before), CLASSIFIED_AT_ONCE):
+            part = slice(i, i + CLASSIFIED_AT_ONCE)
+            if not self._check.classify(before[part], after[part]).all():
+                return False
+        return True

@@ -1,0 +1,63 @@
+"""Features of rope transitions for classifiers of vectors."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from systems.band import band_length, reduced_dim
+from systems.obstacles import Array
+from systems.rope_feature_kernels import CELL, fill_components
+from systems.rope_scene import Scene
+from systems.validation import as_finite_array
+
+
+def vector_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array:
+    """Describe transitions of bands in thirteen numbers.
+
+    They are the distance between the grippers before and after, the length of the band before
+    and after, all as shares of the largest allowed length; then the numbers of connected parts
+    of a vertical slice, before, after and their difference: of all, of the free, and of the
+    occupied parts. The slice lies between the straight line from gripper to gripper and the
+    parabola, as long as the rope may be, that hangs from it. A hook that could catch the rope
+    is a part of its own.
+
+    Parameters
+    ----------
+    reduced, next_reduced : ndarray of shape (n, reduced_dim)
+    scene : Scene
+
+    Returns
+    -------
+    X : ndarray of shape (n, 13)
+
+    References
+    ----------
+    McConachie et al. 2020, "Application to rope manipulation"; the slice from the authors'
+    public code.
+    """
+    dim = reduced_dim(scene)
+    before = np.ascontiguousarray(as_finite_array(reduced, "reduced", (None, dim)))
+    shape = (len(before), dim)
+    after = np.ascontiguousarray(as_finite_array(next_reduced, "next_reduced", shape))
+    lengths = [_separation(before), _separation(after), band_length(before), band_length(after)]
+    columns = [length / scene.max_band_length for length in lengths]
+    parts, next_parts = _slice_parts(before, scene), _slice_parts(after, scene)
+    for kind in range(3):
+        one, other = parts[:, kind], next_parts[:, kind]
+        columns += [one, other, other - one]
+    return np.column_stack(columns)
+
+
+def _separation(rows: Array) -> Array:
+    return np.linalg.norm(rows[:, 3:6] - rows[:, :3], axis=1)
+
+
+def _slice_parts(rows: Array, scene: Scene) -> Array:
+    """Count all, the free and the occupied parts of each row's slice, shape (n, 3)."""
+    side = math.ceil(1.5 * scene.max_band_length / CELL) + 8
+    cells, stack = np.empty((side, side), np.uint8), np.empty(side * side, np.int64)
+    counts = np.empty((len(rows), 2))
+    fill_components(rows, scene.packed, scene.max_band_length, cells, stack, counts)
+    return np.column_stack([counts.sum(axis=1), counts])

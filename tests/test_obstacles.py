@@ -1,0 +1,122 @@
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from systems.distance import signed_distance, signed_distance_and_gradient
+from systems.obstacles import Box, Capsule, Cylinder, pack_obstacles
+
+coordinate = st.floats(-1.0, 1.0)
+point = st.tuples(coordinate, coordinate, coordinate)
+size = st.floats(0.05, 0.5)
+boxes = st.builds(Box, point, st.tuples(size, size, size))
+cylinders = st.builds(Cylinder, point, size, size, st.sampled_from((0, 1, 2)))
+capsules = st.builds(
+    lambda start, way, radius: Capsule(start, tuple(np.add(start, way)), radius),
+    point,
+    st.tuples(size, coordinate, coordinate),
+    size,
+)
+obstacle = st.one_of(boxes, cylinders, capsules)
+
+
+def box_reference(p, box):
+    q = np.abs(np.subtract(p, box.center)) - box.half_extents
+    return np.linalg.norm(np.maximum(q, 0.0)) if (q > 0.0).any() else q.max()
+
+
+def cylinder_reference(p, cylinder):
+    offset = np.subtract(p, cylinder.center)
+    q = np.array(
+        [
+            np.linalg.norm(np.delete(offset, cylinder.axis)) - cylinder.radius,
+            abs(offset[cylinder.axis]) - cylinder.half_length,
+        ]
+    )
+    return np.linalg.norm(np.maximum(q, 0.0)) if (q > 0.0).any() else q.max()
+
+
+def capsule_reference(p, capsule):
+    start, axis = np.array(capsule.start), np.subtract(capsule.end, capsule.start)
+    along = np.clip(np.dot(p - start, axis) / np.dot(axis, axis), 0.0, 1.0)
+    return np.linalg.norm(p - start - along * axis) - capsule.radius
+
+
+def reference(p, obstacles):
+    by_kind = {Box: box_reference, Cylinder: cylinder_reference, Capsule: capsule_reference}
+    return min(by_kind[type(each)](np.array(p), each) for each in obstacles)
+
+
+@given(st.lists(obstacle, min_size=1, max_size=6), st.lists(point, min_size=1, max_size=8))
+@settings(deadline=None)
+def test_the_distance_is_the_smallest_of_the_obstacles_distances(obstacles, points):
+    distances = signed_distance(np.array(points), pack_obstacles(obstacles))
+    np.testing.assert_allclose(distances, [reference(p, obstacles) for p in points], atol=1e-9)
+
+
+@given(obstacle, point)
+@settings(deadline=None)
+def test_the_gradient_leads_to_the_surface(obstacle, p):
+    packed = pack_obstacles([obstacle])
+    distance, gradient = signed_distance_and_gradient(np.array(p), packed)
+    assert np.linalg.norm(gradient) == pytest.approx(1.0)
+    if distance > 0.0:
+        on_surface = np.array(p) - distance * gradient
+        assert signed_distance(on_surface, packed) == pytest.approx(0.0, abs=1e-9)
+
+
+@given(st.lists(obstacle, min_size=1, max_size=6), point)
+@settings(deadline=None)
+def test_following_the_gradient_increases_the_distance_as_far_as_one_goes(obstacles, p):
+    packed = pack_obstacles(obstacles)
+    distance, gradient = signed_distance_and_gradient(np.array(p), packed)
+    moved = signed_distance(np.array(p) + 1e-7 * gradient, packed)
+    # Where two surfaces are equally near, the distance to one of them grows and the other may not.
+    nearest = sorted(reference(p, [each]) for each in obstacles)
+    if len(nearest) == 1 or nearest[1] - nearest[0] > 1e-6:
+        assert moved - distance == pytest.approx(1e-7, rel=1e-2)
+
+
+def test_points_keep_their_shape():
+    packed = pack_obstacles([Box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))])
+    assert signed_distance(np.full((2, 3, 3), 3.0), packed).shape == (2, 3)
+    assert signed_distance(np.array([3.0, 0.0, 0.0]), packed) == pytest.approx(2.0)
+    assert signed_distance(np.array([0.5, 0.0, 0.0]), packed) == pytest.approx(-0.5)
+
+
+def test_without_obstacles_everything_is_far_away():
+    distance, gradient = signed_distance_and_gradient(np.zeros((1, 3)), pack_obstacles([]))
+    assert distance[0] >= 1e9
+    assert (gradient == 0.0).all()
+
+
+@pytest.mark.parametrize("p", [(0.0, 0.0, 0.0), (0.2, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.3)])
+def test_gradients_are_finite_where_directions_are_ambiguous(p):
+    for each in (
+        Box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1)),
+        Cylinder((0.0, 0.0, 0.0), 0.1, 0.1, 2),
+        Cylinder((0.0, 0.0, 0.0), 0.1, 0.1, 0),
+        Capsule((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), 0.1),
+        Capsule((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), 0.1),
+    ):
+        _, gradient = signed_distance_and_gradient(np.array(p), pack_obstacles([each]))
+        assert np.linalg.norm(gradient) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("build", "words"),
+    [
+        (lambda: Box((0, 0, 0), (1, 0, 1)), "half_extents must be positive"),
+        (lambda: Box((0, np.nan, 0), (1, 1, 1)), "Box.center must be finite"),
+        (lambda: Box((0, 0), (1, 1, 1)), r"Box.center must have the shape \(3\)"),
+        (lambda: Cylinder((0, 0, 0), -1.0, 1.0), "radius must be positive"),
+        (lambda: Cylinder((0, 0, 0), 1.0, np.nan), "half_length must be positive"),
+        (lambda: Cylinder((0, 0, 0), 1.0, 1.0, 3), r"axis must be 0 \(x\), 1 \(y\) or 2 \(z\)"),
+        (lambda: Capsule((0, 0, 0), (0, 0, 0), 1.0), "must differ"),
+        (lambda: Capsule((0, 0, 0), (1, 0, 0), np.inf), "radius must be positive and finite"),
+        (lambda: pack_obstacles(["box"]), r"obstacles\[0\] must be a Box"),
+    ],
+)
+def test_degenerate_obstacles_are_refused(build, words):
+    with pytest.raises(ValueError, match=words):
+        build()

@@ -1,0 +1,29 @@
+"""Table I's benchmark: trials that resume, and a table beside the paper's."""
+
+import sys
+from pathlib import Path
+
+import joblib
+import numpy as np
+from sklearn.dummy import DummyClassifier
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+import table1  # noqa: E402
+
+
+def test_trials_resume_and_any_estimator_fits(tmp_path, capsys):
+    options = ["--scenes", "engine_assembly", "--seeds", "2", "--out", str(tmp_path)]
+    table1.main(options)
+    first = capsys.readouterr().out
+    files = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("seed-*.json")}
+    assert len(files) == 2
+    assert "| 1/30 |" in first
+    table1.main(options)
+    assert capsys.readouterr().out == first
+    assert {file: file.stat().st_mtime_ns for file in files} == files
+
+    model = DummyClassifier(strategy="constant", constant=1)
+    joblib.dump(model.fit(np.zeros((2, 13)), [0, 1]), tmp_path / "all.joblib")
+    table1.main([*options, "--model", str(tmp_path / "all.joblib"), "--accuracy", "0.9"])
+    assert "| 10/30 |" in capsys.readouterr().out
+    assert len(list(tmp_path.rglob("seed-*.json"))) == 4
