@@ -21,7 +21,7 @@ env: $(ENV)/ready
 
 $(ENV)/ready: setup.cfg pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(ENV)
-	$(RUN) -m pip install --quiet --constraint constraints.txt --editable ".[test,examples]"
+	$(RUN) -m pip install --quiet --constraint constraints.txt --editable ".[test,examples,pybullet]"
 	touch $@
 
 clean:

@@ -45,7 +45,11 @@ def test_no_import_runs_back_up_the_road(package):
 @pytest.mark.parametrize(
     ("library", "allowed"),
     [
-        ("mujoco", {"systems/planar_arm.py"}),
+        (
+            "mujoco",
+            {"systems/planar_arm.py", "systems/rope_mujoco.py", "systems/rope_pictures.py"},
+        ),
+        ("pybullet", {"systems/rope_pybullet.py"}),
         ("torch", {"reliability/networks.py"}),
         ("skorch", {"reliability/networks.py"}),
         ("ompl", {"planners/ompl_search.py"}),
