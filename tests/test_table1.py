@@ -8,7 +8,7 @@ import numpy as np
 from sklearn.dummy import DummyClassifier
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
-import table1  # noqa: E402
+import table1
 
 
 def test_trials_resume_and_any_estimator_fits(tmp_path, capsys):
