@@ -6,12 +6,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from systems.angles import shortest_way, wrap_columns
+
 Array = NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)
 def split_edges(
-    starts: Array, ends: Array, step_size: float
+    starts: Array, ends: Array, step_size: float, angular: tuple[int, ...] = ()
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """Cut straight edges into equal transitions no longer than ``step_size``.
 
@@ -19,6 +20,8 @@ def split_edges(
     ----------
     starts, ends : ndarray of shape (n_edges, d)
     step_size : float
+    angular : tuple of int, default=()
+        Entries that are angles, which an edge turns the short way round.
 
     Returns
     -------
@@ -27,6 +30,20 @@ def split_edges(
     edge : ndarray of int of shape (n_transitions,)
         The edge that each transition belongs to.
     """
+    if not angular:
+        return _split_straight(starts, ends, step_size)
+    unrolled = starts + shortest_way(starts, ends, angular)
+    origins, targets, edge = _split_straight(starts, unrolled, step_size)
+    origins, targets = wrap_columns(origins, angular), wrap_columns(targets, angular)
+    # Rounding must not part an edge's end from the vertex that it leads to.
+    targets[np.flatnonzero(np.diff(edge, append=len(starts)))] = ends
+    return origins, targets, edge
+
+
+@njit(cache=True, nogil=True)
+def _split_straight(
+    starts: Array, ends: Array, step_size: float
+) -> tuple[Array, Array, NDArray[np.int64]]:
     n_edges, dim = starts.shape
     pieces = np.empty(n_edges, np.int64)
     for e in range(n_edges):

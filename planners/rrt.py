@@ -96,5 +96,5 @@ class BiasedRRT(BiasedPlanner):
 
     def _shortened(self, path: Array, search: Search) -> tuple[Array, Array]:
         checker = EdgeChecker(self.system, search.check)
-        shorter = shorten(path, checker, self.system.step_size, search.rng)
+        shorter = shorten(path, checker, self.system, search.rng)
         return shorter, self.system.steer(shorter[:-1], shorter[1:])

@@ -9,10 +9,16 @@ from systems.errors import SimulationDivergedError, SystemContractError
 from systems.system import Problem, Rollout, StopReason, System
 
 if TYPE_CHECKING:
+    from systems.car import Car
+    from systems.car_scenes import CarScene, Circle, ConvexPolygon, random_car_scene
     from systems.contract_checks import check_system
     from systems.planar_arm import PlanarArm
 
 __all__ = [
+    "Car",
+    "CarScene",
+    "Circle",
+    "ConvexPolygon",
     "PlanarArm",
     "Problem",
     "Rollout",
@@ -21,9 +27,18 @@ __all__ = [
     "System",
     "SystemContractError",
     "check_system",
+    "random_car_scene",
 ]
 
-_HOMES = {"PlanarArm": "systems.planar_arm", "check_system": "systems.contract_checks"}
+_HOMES = {
+    "Car": "systems.car",
+    "CarScene": "systems.car_scenes",
+    "Circle": "systems.car_scenes",
+    "ConvexPolygon": "systems.car_scenes",
+    "PlanarArm": "systems.planar_arm",
+    "check_system": "systems.contract_checks",
+    "random_car_scene": "systems.car_scenes",
+}
 
 
 def __getattr__(name: str) -> Any:
