@@ -20,7 +20,7 @@ from systems.system import Array, Problem, Rollout, StopReason, System
 from systems.validation import RandomState, as_finite_array, as_generator
 
 STEP_SIZE = 1.0
-CLOSE_DISTANCE = 0.3
+CLOSE_DISTANCE = 0.15
 GOAL_DISTANCE = 1e-6
 ROOM_AT_ENDS = 0.05
 

@@ -13,12 +13,13 @@ Array = NDArray[np.float64]
 
 TIME_STEP = 0.01
 LONGEST_COMMAND = 4.0
-MAX_SPEED = 2.5
-CRUISE_SPEED = 1.5
+MAX_SPEED = 2.0
+CRUISE_SPEED = 1.2
+ARRIVAL_SPEED = 0.3
 MAX_ACCELERATION = 2.0
 MAX_LATERAL_ACCELERATION = 2.0
 MAX_STEERING = 0.55
-MAX_STEERING_RATE = 5.0
+MAX_STEERING_RATE = 6.0
 STANDSTILL = 1e-3
 HEADING_GAIN = 2.5
 NEAREST_AIM = 0.25
@@ -84,7 +85,7 @@ def _controls(state: Array, target: Array, direction: float) -> tuple[float, flo
 
     The curvature is that of the circle through here that arrives at the target in the right
     direction of travel, and a pull towards that circle's own direction. Speed is lowered to
-    what that curvature allows.
+    what that curvature allows, and to 0.3 m/s at the target.
     """
     if direction == 0:
         return 0.0, 0.0
@@ -95,10 +96,11 @@ def _controls(state: Array, target: Array, direction: float) -> tuple[float, flo
     bearing = np.arctan2(dy, dx)
     bend = _clip(wrap_angle(target[2] + behind - bearing), LARGEST_APPROACH)
     error = wrap_angle(bearing - bend - state[2] - behind)
-    distance = max(NEAREST_AIM, np.sqrt(dx * dx + dy * dy))
-    curvature = (2 * np.sin(bend) + HEADING_GAIN * error) / distance
+    distance = np.hypot(dx, dy)
+    curvature = (2 * np.sin(bend) + HEADING_GAIN * error) / max(NEAREST_AIM, distance)
     tight = max(min(abs(curvature), curvature_limit(0.0)), 1e-6)
-    speed = min(CRUISE_SPEED, np.sqrt(MAX_LATERAL_ACCELERATION / tight))
+    slowing = np.sqrt(ARRIVAL_SPEED**2 + 2 * MAX_ACCELERATION * distance)
+    speed = min(CRUISE_SPEED, slowing, np.sqrt(MAX_LATERAL_ACCELERATION / tight))
     return direction * speed, direction * curvature
 
 

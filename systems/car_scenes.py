@@ -10,7 +10,7 @@ from systems.system import Array
 from systems.validation import RandomState, as_finite_array, as_generator
 
 LOT_SIZE = 8.0
-MIN_OBSTACLES, MAX_OBSTACLES = 6, 12
+MIN_OBSTACLES, MAX_OBSTACLES = 5, 10
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def rectangle(x: float, y: float, length: float, width: float, angle: float = 0.
 
 
 def random_car_scene(random_state: RandomState = None) -> CarScene:
-    """Draw a lot of 8 m by 8 m with 6 to 12 circles and rectangles anywhere in it."""
+    """Draw a lot of 8 m by 8 m with 5 to 10 circles and rectangles anywhere in it."""
     rng = as_generator(random_state)
     obstacles: list[Circle | ConvexPolygon] = []
     for _ in range(rng.integers(MIN_OBSTACLES, MAX_OBSTACLES + 1)):
