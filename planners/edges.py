@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from systems.angles import shortest_way, wrap_columns
+from systems.angles import wrap_angle
 
 Array = NDArray[np.float64]
 
@@ -32,12 +32,7 @@ def split_edges(
     """
     if not angular:
         return _split_straight(starts, ends, step_size)
-    unrolled = starts + shortest_way(starts, ends, angular)
-    origins, targets, edge = _split_straight(starts, unrolled, step_size)
-    origins, targets = wrap_columns(origins, angular), wrap_columns(targets, angular)
-    # Rounding must not part an edge's end from the vertex that it leads to.
-    targets[np.flatnonzero(np.diff(edge, append=len(starts)))] = ends
-    return origins, targets, edge
+    return _split_turning(starts, ends, step_size, angular)
 
 
 @njit(cache=True, nogil=True)
@@ -68,4 +63,23 @@ def _split_straight(
                 else:
                     targets[row, i] = ends[e, i]
             row += 1
+    return origins, targets, edge
+
+
+@njit(cache=True, nogil=True)
+def _split_turning(
+    starts: Array, ends: Array, step_size: float, angular: tuple[int, ...]
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    unrolled = ends.copy()
+    for e in range(starts.shape[0]):
+        for i in angular:
+            unrolled[e, i] = starts[e, i] + wrap_angle(ends[e, i] - starts[e, i])
+    origins, targets, edge = _split_straight(starts, unrolled, step_size)
+    for row in range(edge.shape[0]):
+        for i in angular:
+            origins[row, i] = wrap_angle(origins[row, i])
+            targets[row, i] = wrap_angle(targets[row, i])
+        # Rounding must not part an edge's end from the vertex that it leads to.
+        if row + 1 == edge.shape[0] or edge[row + 1] != edge[row]:
+            targets[row] = ends[edge[row]]
     return origins, targets, edge

@@ -30,13 +30,16 @@ def wrap_columns(rows: Array, angular: tuple[int, ...]) -> Array:
     """
     if not angular:
         return rows
-    wrapped = rows.copy()
-    for i in angular:
-        angles = rows[..., i]
-        turned = angles - TURN * np.floor((angles + np.pi) / TURN)
-        turned = np.where(turned < np.pi, turned, -np.pi)
-        wrapped[..., i] = np.where((angles >= -np.pi) & (angles < np.pi), angles, turned)
+    wrapped = np.array(rows, order="C")
+    _wrap_in_place(wrapped.reshape(-1, rows.shape[-1]), angular)
     return wrapped
+
+
+@njit(cache=True, nogil=True)
+def _wrap_in_place(rows: Array, angular: tuple[int, ...]) -> None:
+    for row in range(rows.shape[0]):
+        for i in angular:
+            rows[row, i] = wrap_angle(rows[row, i])
 
 
 def shortest_way(starts: Array, ends: Array, angular: tuple[int, ...]) -> Array:

@@ -14,7 +14,7 @@ from systems.car_dynamics import (
     execute_rows,
 )
 from systems.car_features import transition_features
-from systems.car_geometry import clearances, straight_moves
+from systems.car_geometry import clearances, limited_ways, straight_moves
 from systems.car_scenes import SCENES, CarScene, pack_scene
 from systems.system import Array, Problem, Rollout, StopReason, System
 from systems.validation import RandomState, as_finite_array, as_generator
@@ -101,11 +101,7 @@ class Car(System):
     def steer(self, reduced: Array, configuration: Array) -> Array:
         """Return the displacement of at most one step towards a pose, the short way round."""
         _check_rows(reduced, configuration)
-        way = shortest_way(reduced, configuration, self.angular)
-        length = np.linalg.norm(way, axis=1, keepdims=True)
-        # The allowance lets transitions that were cut to one step arrive exactly.
-        far = length > self.step_size * (1 + 1e-9)
-        return np.where(far, way * (self.step_size / np.maximum(length, self.step_size)), way)
+        return limited_ways(reduced, configuration, self.step_size)
 
     def rollout(self, state: Any, commands: ArrayLike) -> Rollout:
         """Drive one displacement after the other: Γ.

@@ -119,6 +119,25 @@ def clearances(poses: Array, hulls: Array, corners: Array, walls: Array) -> Arra
 
 
 @njit(cache=True, nogil=True)
+def limited_ways(poses: Array, targets: Array, step_size: float) -> Array:
+    """Return the displacements towards poses, the short way round and of at most one step.
+
+    Parameters
+    ----------
+    poses, targets : ndarray of shape (n, 3)
+    step_size : float
+    """
+    ways = targets - poses
+    for row in range(ways.shape[0]):
+        ways[row, 2] = wrap_angle(ways[row, 2])
+        length = np.sqrt(ways[row, 0] ** 2 + ways[row, 1] ** 2 + ways[row, 2] ** 2)
+        # The allowance lets transitions that were cut to one step arrive exactly.
+        if length > step_size * (1 + 1e-9):
+            ways[row] *= step_size / length
+    return ways
+
+
+@njit(cache=True, nogil=True)
 def straight_moves(
     poses: Array, moves: Array, hulls: Array, corners: Array, walls: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
