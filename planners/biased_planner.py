@@ -8,14 +8,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
 
 from planners.check_transition import CheckTransition
 from planners.ompl_search import Budget
 from planners.result import PlanResult, PlanStatus
 from systems.system import Array, System
-from systems.validation import RandomState, as_finite_array, as_generator, check_within_bounds
+from systems.validation import (
+    RandomState,
+    as_finite_array,
+    as_seed,
+    check_count,
+    check_within_bounds,
+)
 
 
 @dataclass(frozen=True)
@@ -103,7 +109,7 @@ class BiasedPlanner(BaseEstimator):
         """
         began = time.perf_counter()
         self._check_parameters()
-        seed = _as_seed(self.random_state)
+        seed = as_seed(self.random_state)
         for_search, for_ompl = np.random.SeedSequence(seed).spawn(2)
         rng = np.random.default_rng(for_search)
         check = CheckTransition(
@@ -120,7 +126,7 @@ class BiasedPlanner(BaseEstimator):
             reduced=found.reduced,
             commands=found.commands,
             status=found.status,
-            reliability=check.probability(found.reduced[:-1], found.reduced[1:]),
+            reliability=self._reliability(found, check),
             planning_time=duration - found.simplification_time,
             simplification_time=found.simplification_time,
             n_checked=check.n_checked,
@@ -130,13 +136,15 @@ class BiasedPlanner(BaseEstimator):
             random_state=seed,
         )
 
+    def _reliability(self, found: Found, check: CheckTransition) -> Array | None:
+        if self.estimator is None:
+            return None
+        return check.probability(found.reduced[:-1], found.reduced[1:])
+
     def _check_parameters(self) -> None:
         if not isinstance(self.system, System):
             raise ValueError(f"system must be a System, got {self.system!r}.")
-        if not _is_count(self.max_iterations):
-            raise ValueError(
-                f"max_iterations must be a positive integer, got {self.max_iterations!r}."
-            )
+        check_count(self.max_iterations, "max_iterations")
         limit = self.time_limit
         if limit is not None and not (isinstance(limit, int | float) and limit > 0):
             raise ValueError(f"time_limit must be None or positive seconds, got {limit!r}.")
@@ -167,7 +175,7 @@ class BiasedPlanner(BaseEstimator):
             )
         return goals[possible]
 
-    def _can_stay(self, reduced: Array) -> Array:
+    def _can_stay(self, reduced: Array) -> NDArray[np.bool_]:
         """Say, row by row, whether g allows the transition that goes nowhere."""
         command = self.system.steer(reduced, reduced[:, : self.system.configuration_dim])
         return self.system.propagate(reduced, command)[1]
@@ -178,14 +186,4 @@ class BiasedPlanner(BaseEstimator):
         trusted = check.classify(goals, goals)
         if trusted.any():
             return goals[trusted]
-        return goals[[np.argmax(check.probability(goals, goals))]]
-
-
-def _as_seed(random_state: RandomState) -> int:
-    if isinstance(random_state, int | np.integer) and random_state >= 0:
-        return int(random_state)
-    return int(as_generator(random_state).integers(2**63))
-
-
-def _is_count(value: Any) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool) and value > 0
+        return goals[[int(np.argmax(check.probability(goals, goals)))]]

@@ -10,6 +10,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from reliability.labels import RELIABLE, UNRELIABLE
 from systems.system import Array, System
+from systems.validation import check_number
 
 _NAMES = {"reliable": True, "unreliable": False}
 
@@ -62,7 +63,7 @@ class CheckTransition:
         self._system = system
         self._estimator = estimator
         self._rng = rng
-        _check_number("k", k, 0, np.inf)
+        check_number(k, "k", 0, np.inf)
         if estimator is None:
             return
         self._reliable_column = _reliable_column(_checked_classes(estimator))
@@ -102,25 +103,46 @@ class CheckTransition:
         if self._estimator is None or len(reduced) == 0:
             return np.ones(len(reduced), dtype=np.bool_)
         self.n_checked += len(reduced)
+        return self._predict(self._system.features(reduced, next_reduced))
+
+    def probability(self, reduced: Array, next_reduced: Array) -> Array:
+        """Return the probability that each transition is Reliable; not counted, and no draws."""
+        if self._estimator is None:
+            return np.ones(len(reduced))
+        return self._probability(self._system.features(reduced, next_reduced))
+
+    def appraise(self, reduced: Array, next_reduced: Array) -> tuple[NDArray[np.bool_], Array]:
+        """Return :meth:`classify` and :meth:`probability` in one."""
+        if self._estimator is None or len(reduced) == 0:
+            return np.ones(len(reduced), dtype=np.bool_), np.ones(len(reduced))
+        self.n_checked += len(reduced)
         rows = self._system.features(reduced, next_reduced)
         if self._fast is not None:
-            return (self._fast(rows) > 0) == (self._reliable_column == 1)
-        predicted = np.asarray(self._estimator.predict(rows))
-        if self._reliable_column is None:
-            return np.zeros(len(rows), dtype=np.bool_)
-        return predicted == self._estimator.classes_[self._reliable_column]
-
-    def probability(self, reduced: Array, next_reduced: Array) -> Array | None:
-        """Return the probability that each transition is Reliable, None without an estimator."""
-        if self._estimator is None:
-            return None
-        if self._reliable_column is None or len(reduced) == 0:
-            return np.zeros(len(reduced))
+            probability = self._probability(rows)
+            return probability > 0.5, probability
+        reliable = self._predict(rows)
         if not hasattr(self._estimator, "predict_proba"):
-            return self.classify(reduced, next_reduced).astype(np.float64)
-        rows = self._system.features(reduced, next_reduced)
+            return reliable, reliable.astype(np.float64)
+        return reliable, self._probability(rows)
+
+    def _probability(self, rows: NDArray[Any]) -> Array:
+        if self._reliable_column is None or len(rows) == 0:
+            return np.zeros(len(rows))
+        if self._fast is not None:
+            logits = self._fast(rows).astype(np.float64)
+            return np.exp(-np.logaddexp(0, -logits if self._reliable_column == 1 else logits))
+        if not hasattr(self._estimator, "predict_proba"):
+            return self._predict(rows).astype(np.float64)
         columns = np.asarray(self._estimator.predict_proba(rows), dtype=np.float64)
         return columns[:, self._reliable_column]
+
+    def _predict(self, rows: NDArray[Any]) -> NDArray[np.bool_]:
+        if self._reliable_column is None or len(rows) == 0:
+            return np.zeros(len(rows), dtype=np.bool_)
+        if self._fast is not None:
+            return (self._fast(rows) > 0) == self._reliable_column
+        predicted = np.asarray(self._estimator.predict(rows))
+        return predicted == self._estimator.classes_[self._reliable_column]
 
 
 def _checked_classes(estimator: Any) -> list[Any]:
@@ -163,17 +185,11 @@ def _check_n_features(system: System, estimator: Any) -> None:
 def _resolve_accuracy(estimator: Any, accuracy: float | None) -> float:
     if accuracy is None:
         accuracy = getattr(estimator, "validation_accuracy_", None)
-    if accuracy is None or np.isnan(accuracy):
+    if accuracy is None or (isinstance(accuracy, float) and np.isnan(accuracy)):
         raise ValueError(
             f"accuracy (p_acc) is not known: {type(estimator).__name__} has no "
             "validation_accuracy_ of held-out data. Pass accuracy, measured on plans that the "
             "estimator was not fitted on."
         )
-    _check_number("accuracy", accuracy, 0, 1)
+    check_number(accuracy, "accuracy", 0, 1)
     return float(accuracy)
-
-
-def _check_number(name: str, value: Any, low: float, high: float) -> None:
-    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    if not number or not low <= value <= high:
-        raise ValueError(f"{name} must be a number between {low} and {high}, got {value!r}.")

@@ -47,10 +47,25 @@ class EdgeChecker:
         edges = [np.stack([starts[a], ends[a]], axis=1) for starts, ends, a in self._accepted]
         return np.concatenate([np.empty((0, 2, self._system.reduced_dim)), *edges])
 
-    def reliable(self, starts: Array, ends: Array) -> NDArray[np.bool_]:
-        """Accept edges of which every transition is classified Reliable, with no draws."""
+    def appraise(self, starts: Array, ends: Array) -> tuple[NDArray[np.bool_], Array]:
+        """Judge edges without any draws.
+
+        Returns
+        -------
+        reliable : ndarray of bool of shape (n_edges,)
+            Whether every transition of the edge is classified Reliable.
+        doubt : ndarray of shape (n_edges,)
+            The edge's part in -log of the probability that all goes well.
+        """
         possible, origins, following, edge = self._propagate(starts, ends)
-        return _all_per_edge(possible, edge, self._check.classify(origins, following))
+        reliable, probability = self._check.appraise(origins, following)
+        doubt = np.zeros(len(starts))
+        np.add.at(doubt, edge, _doubts(probability))
+        return _all_per_edge(possible, edge, reliable), doubt
+
+    def doubts(self, reduced: Array, next_reduced: Array) -> Array:
+        """Return -log of the probability that each transition is Reliable, shape (n,)."""
+        return _doubts(self._check.probability(reduced, next_reduced))
 
     def _propagate(
         self, starts: Array, ends: Array
@@ -66,6 +81,10 @@ class EdgeChecker:
             kept = possible[edge]
             origins, following, edge = origins[kept], following[kept], edge[kept]
         return possible, origins, following, edge
+
+
+def _doubts(probability: Array) -> Array:
+    return -np.log(np.maximum(probability, 1e-12))
 
 
 def _all_per_edge(

@@ -18,7 +18,10 @@ ARRIVED = 1e-9
 
 
 class LockstepRRT:
-    """An RRT of which each round extends a few branches, one transition each at a time.
+    """An RRT that extends a few branches at once, one transition each per question.
+
+    A branch grows towards its sample until it arrives or a transition is rejected; then another
+    sample takes its place.
 
     Parameters
     ----------
@@ -52,10 +55,15 @@ class LockstepRRT:
     def __call__(self, clock: Clock) -> Array | None:
         """Search until a state is a goal; return the configurations, None when time is up."""
         found = bool(self._system.goal_reached(self.tree.reduced, self._goals)[0])
+        targets, tips = self._goals[:0], np.arange(0)
         while not found:
-            if clock.spent(EXTENSIONS_PER_ROUND):
+            n_idle = EXTENSIONS_PER_ROUND - len(targets)
+            if clock.spent(n_idle):
                 return None
-            found = self._grow(self._sample())
+            samples = self._sample(n_idle)
+            targets = np.concatenate([targets, samples])
+            tips = np.concatenate([tips, self.tree.nearest(samples)])
+            found, targets, tips = self._step(targets, tips)
         return self.path()[0][:, : self._system.configuration_dim]
 
     def path(self) -> tuple[Array, Array]:
@@ -68,41 +76,31 @@ class LockstepRRT:
         start = self.tree.reduced[:1]
         return self._system.steer(start, start[:, : self._system.configuration_dim])[:0]
 
-    def _sample(self) -> Array:
+    def _sample(self, n: int) -> Array:
         low, high = self._system.bounds
-        samples = self._rng.uniform(low, high, size=(EXTENSIONS_PER_ROUND, len(low)))
-        to_goal = self._rng.random(EXTENSIONS_PER_ROUND) < GOAL_BIAS
+        samples = self._rng.uniform(low, high, size=(n, len(low)))
+        to_goal = self._rng.random(n) < GOAL_BIAS
         chosen = self._rng.integers(len(self._goals), size=int(to_goal.sum()))
         samples[to_goal] = self._goals[chosen]
         return samples
 
-    def _grow(self, targets: Array) -> bool:
-        """Extend a branch towards each target until all have ended; tell whether a goal is met."""
-        nearest = self.tree.nearest(targets)
-        while len(targets):
-            advancing, targets, nearest = self._step(targets, nearest)
-            if len(advancing) == 0:
-                return False
-            reached = self._system.goal_reached(self.tree.reduced[advancing], self._goals)
-            if reached.any():
-                self._last = int(advancing[np.argmax(reached)])
-                return True
-        return False
-
     def _step(
-        self, targets: Array, nearest: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
-        """Add one transition to each branch; return the new states and who goes on from where."""
+        self, targets: Array, tips: NDArray[np.int64]
+    ) -> tuple[bool, Array, NDArray[np.int64]]:
+        """Add one transition to each branch; return whether a goal is met, and who goes on."""
         system = self._system
-        reduced = self.tree.reduced[nearest]
+        reduced = self.tree.reduced[tips]
         command = system.steer(reduced, targets)
         following, valid = system.propagate(reduced, command)
         moved = following[:, : system.configuration_dim] != reduced[:, : system.configuration_dim]
         possible = np.flatnonzero(valid & moved.any(axis=1))
         accepted = possible[self._check(reduced[possible], following[possible])]
-        added = self.tree.add(following[accepted], nearest[accepted])
+        added = self.tree.add(following[accepted], tips[accepted])
         self._commands.append(command[accepted])
+        reached = system.goal_reached(following[accepted], self._goals)
+        if reached.any():
+            self._last = int(added[np.argmax(reached)])
         configurations = following[accepted, : system.configuration_dim]
         left = shortest_way(configurations, targets[accepted], system.angular)
         going_on = (np.abs(left) > ARRIVED * system.step_size).any(axis=1)
-        return added, targets[accepted[going_on]], added[going_on]
+        return bool(reached.any()), targets[accepted[going_on]], added[going_on]

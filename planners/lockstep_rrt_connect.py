@@ -55,9 +55,8 @@ class LockstepRRTConnect:
         """Search until the trees meet; return the path's vertices, None when time is up."""
         tree, other = self._from_start, self._to_goal
         while not clock.spent(EXTENSIONS_PER_ROUND):
-            samples = self._rng.uniform(
-                *self._bounds, size=(EXTENSIONS_PER_ROUND, self._bounds.shape[1])
-            )
+            low, high = self._bounds
+            samples = self._rng.uniform(low, high, size=(EXTENSIONS_PER_ROUND, len(low)))
             added, _ = self._extend(tree, samples, tree.nearest(samples))
             met = self._connect(other, tree.reduced[added])
             if met is not None:

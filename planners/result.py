@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-import zipfile
 from dataclasses import dataclass, fields
 from enum import Enum
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from systems.archive import read_arrays, write_arrays
 
 FORMAT_VERSION = 1
 Array = NDArray[np.float64]
@@ -76,15 +76,11 @@ class PlanResult:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file."""
-        target = Path(path)
-        partial = target.with_name(target.name + ".partial")
         values: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
         values["status"] = self.status.name
         if self.reliability is None:
             del values["reliability"]
-        with partial.open("wb") as file:
-            np.savez(file, format_version=np.array(FORMAT_VERSION), **values)
-        os.replace(partial, target)
+        write_arrays(path, values, format_version=FORMAT_VERSION)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> PlanResult:
@@ -95,22 +91,10 @@ class PlanResult:
         ValueError
             If the file is no such file, is truncated, or has another format version.
         """
-        try:
-            with np.load(path, allow_pickle=False) as archive:
-                version = int(archive["format_version"])
-                if version != FORMAT_VERSION:
-                    raise ValueError(
-                        f"{path} has the format version {version} and this library reads "
-                        f"{FORMAT_VERSION}; plan again, or load it with the version of the "
-                        "library that wrote it."
-                    )
-                values = {name: archive[name] for name in archive.files}
-        except FileNotFoundError:
-            raise
-        except (zipfile.BadZipFile, KeyError, EOFError, OSError, AttributeError) as error:
-            raise ValueError(f"{path} is not a whole file of a plan ({error}).") from error
-        del values["format_version"]
-        arrays = ("reduced", "commands", "reliability", "tree")
-        values = {k: v if k in arrays else v.item() for k, v in values.items()}
+        names = {field.name for field in fields(cls)} - {"reliability"}
+        arrays = read_arrays(path, names, format_version=FORMAT_VERSION, kind="a plan")
+        values: dict[str, Any] = {"reliability": None} | arrays
+        for name in names - {"reduced", "commands", "tree"}:
+            values[name] = arrays[name].item()
         values["status"] = PlanStatus[values["status"]]
-        return cls(**{"reliability": None} | values)
+        return cls(**values)

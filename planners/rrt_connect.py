@@ -15,7 +15,7 @@ from planners.ompl_search import rrt_connect, search_as_planner
 from planners.result import PlanStatus
 from planners.shortcut import shorten
 from systems.system import Array, System
-from systems.validation import RandomState
+from systems.validation import RandomState, check_count
 
 
 class BiasedRRTConnect(BiasedPlanner):
@@ -85,9 +85,7 @@ class BiasedRRTConnect(BiasedPlanner):
 
     def _check_parameters(self) -> None:
         super()._check_parameters()
-        n = self.transitions_per_edge
-        if not isinstance(n, int | np.integer) or isinstance(n, bool) or n < 1:
-            raise ValueError(f"transitions_per_edge must be a positive integer, got {n!r}.")
+        check_count(self.transitions_per_edge, "transitions_per_edge")
         if self.system.configuration_dim != self.system.reduced_dim:
             raise ValueError(
                 "BiasedRRTConnect needs a system whose reduced state is only a configuration, "

@@ -43,8 +43,8 @@ class SearchTree:
         new_size = self._size + len(reduced)
         if new_size > len(self._reduced):
             capacity = max(2 * len(self._reduced), new_size, 256)
-            self._reduced = _grown(self._reduced, capacity)
-            self._parents = _grown(self._parents, capacity)
+            self._reduced = np.resize(self._reduced, (capacity, self._reduced.shape[1]))
+            self._parents = np.resize(self._parents, capacity)
         added = np.arange(self._size, new_size)
         self._reduced[added] = reduced
         self._parents[added] = parents
@@ -131,9 +131,3 @@ def nearest_wrapped_rows(
                 smallest = squared
                 nearest[query] = row
     return nearest
-
-
-def _grown(array: NDArray[np.generic], capacity: int) -> NDArray[np.generic]:
-    grown = np.empty((capacity, *array.shape[1:]), dtype=array.dtype)
-    grown[: len(array)] = array
-    return grown

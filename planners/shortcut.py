@@ -15,12 +15,12 @@ SMALLEST_SAVING = 1e-6
 
 
 def shorten(path: Array, checker: EdgeChecker, system: System, rng: np.random.Generator) -> Array:
-    """Replace parts of a path by straight lines that are Reliable all along.
+    """Replace parts of a path by straight lines that are at least as reliable.
 
-    A shortcut is classified in the direction in which it will be executed and nothing is drawn,
-    so that every transition of the result was either accepted in the search or is classified
-    Reliable. (A shortcut that is tried again and again until a draw lets it pass would undo the
-    bias.)
+    Every transition of a shortcut must be classified Reliable, in the direction in which it will
+    be executed, and together they must be as likely to go well as those they replace. Nothing is
+    drawn: a shortcut that is tried until a draw lets it pass would undo the bias. So every
+    transition of the result was either accepted in the search or is classified Reliable.
 
     Parameters
     ----------
@@ -34,18 +34,24 @@ def shorten(path: Array, checker: EdgeChecker, system: System, rng: np.random.Ge
     -------
     shortened : ndarray of shape (S + 1, configuration_dim), S <= T
     """
+    doubts = checker.doubts(path[:-1], path[1:])
     for _ in range(ROUNDS):
         if len(path) <= 2:
             break
         first, last, saving = _propose(path, system.angular, rng)
         if len(first) == 0:
             continue
-        saving[~checker.reliable(path[first], path[last])] = 0
+        reliable, doubt = checker.appraise(path[first], path[last])
+        so_far = np.concatenate([[0.0], np.cumsum(doubts)])
+        saving[~reliable | (doubt > so_far[last] - so_far[first])] = 0
         best = int(np.argmax(saving))
         if saving[best] > 0:
             start, end = first[best], last[best]
-            _, straight, _ = split_edges(
+            origins, straight, _ = split_edges(
                 path[start][None], path[end][None], system.step_size, system.angular
+            )
+            doubts = np.concatenate(
+                [doubts[:start], checker.doubts(origins, straight), doubts[end:]]
             )
             path = np.concatenate([path[: start + 1], straight, path[end + 1 :]])
     return path

@@ -11,21 +11,26 @@ from reliability.transitions import Transitions
 if TYPE_CHECKING:
     from reliability.classifier import TransitionReliabilityClassifier
     from reliability.collect import collect_transitions
+    from reliability.persistence import ModelFileError, load_estimator
 
 __version__ = "0.1.0"
 
 __all__ = [
     "RELIABLE",
     "UNRELIABLE",
+    "ModelFileError",
     "TransitionReliabilityClassifier",
     "Transitions",
     "collect_transitions",
     "label_transitions",
+    "load_estimator",
 ]
 
 _HOMES = {
     "TransitionReliabilityClassifier": "reliability.classifier",
     "collect_transitions": "reliability.collect",
+    "ModelFileError": "reliability.persistence",
+    "load_estimator": "reliability.persistence",
 }
 
 

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, ClassifierMixin
-from sklearn.model_selection import GroupShuffleSplit, ShuffleSplit
-from sklearn.utils import compute_class_weight
 from sklearn.utils.metaestimators import available_if
-from sklearn.utils.multiclass import type_of_target
-from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted, validate_data
 
 from reliability.mlp_kernel import mlp_logits
-from systems.validation import RandomState, as_generator
+from reliability.persistence import ModelFileError
+from reliability.training_set import encode_labels, hold_out, weigh_rows
+from systems.validation import RandomState, as_generator, check_count, check_number
 
 FORMAT_VERSION = 1
 LEAKY_SLOPE = np.float32(0.01)
@@ -169,20 +168,20 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
             If training diverges.
         """
         self._check_parameters()
-        X, y = validate_data(self, X, y, dtype=np.float32)
-        self.classes_, target = _encode(y)
-        weight = self._row_weights(y, sample_weight)
+        rows, labels = validate_data(self, X, y, dtype=np.float32)
+        self.classes_, target = encode_labels(labels)
+        weight = weigh_rows(labels, self.classes_, self.class_weight, sample_weight)
         rng = as_generator(self.random_state)
-        training, held_out = self._split(len(X), groups, rng)
+        training, held_out = hold_out(len(rows), groups, self.validation_fraction, rng)
         used = training[weight[training] > 0]
         if len(used) == 0:
             raise ValueError("sample_weight must be positive for some training row, got zeros.")
         self.history_: list[dict[str, float]] = []
-        self._state: dict[str, NDArray[np.float32]] | None = None
+        self._state: dict[str, NDArray[np.float32]] = {}
         self._forget_module()
         self._constant = _constant_logit(target[used], len(self.classes_))
         if self._constant is None:
-            self._train(X, target, weight, used, held_out, int(rng.integers(2**31)))
+            self._train(rows, target, weight, used, held_out, int(rng.integers(2**31)))
         else:
             warnings.warn(
                 "The training rows are all of one class, which will always be predicted.",
@@ -192,7 +191,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         self._package_versions = {name: version(name) for name in STAMPED_PACKAGES}
         truth = self.classes_[target[held_out]]
         self.validation_accuracy_ = (
-            float(np.mean(self.predict(X[held_out]) == truth)) if len(held_out) else float("nan")
+            float(np.mean(self.predict(rows[held_out]) == truth)) if len(held_out) else float("nan")
         )
         return self
 
@@ -209,18 +208,18 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
             Positive where ``classes_[1]`` is predicted.
         """
         check_is_fitted(self)
-        X = validate_data(self, X, dtype=np.float32, reset=False)
+        rows: NDArray[np.float32] = validate_data(self, X, dtype=np.float32, reset=False)
         if self._constant is not None:
-            return np.full(len(X), self._constant, dtype=np.float32)
+            return np.full(len(rows), self._constant, dtype=np.float32)
         if not _is_mlp(self):
-            return self._torch_logits(X)
-        if len(X) < ROWS_FOR_TORCH:
-            return self._kernel_logits(X)
-        decision = self._torch_logits(X)
+            return self._torch_logits(rows)
+        if len(rows) < ROWS_FOR_TORCH:
+            return self._kernel_logits(rows)
+        decision = self._torch_logits(rows)
         # Rounding must not decide: near the boundary planners and predict ask the same kernel.
-        largest = 1 + np.abs(X).max(axis=1)
+        largest = 1 + np.abs(rows).max(axis=1)
         doubtful = np.abs(decision) < LOGIT_ROUNDING * largest
-        decision[doubtful] = self._kernel_logits(X[doubtful])
+        decision[doubtful] = self._kernel_logits(rows[doubtful])
         return decision
 
     @available_if(_is_mlp)
@@ -281,7 +280,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         """Refuse the state of another format."""
         found = state.get("_format_version", FORMAT_VERSION)
         if found != FORMAT_VERSION:
-            raise ValueError(
+            raise ModelFileError(
                 f"This classifier was saved in format {found} with {state['_package_versions']}; "
                 f"this version of transition-reliability reads format {FORMAT_VERSION}. Load it "
                 "with the version that saved it, or train it again."
@@ -347,74 +346,28 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         return mlp_logits(rows, *self._flat, LEAKY_SLOPE)
 
     def _forget_module(self) -> None:
-        vars(self).pop("_module", None)
-        vars(self).pop("_flat", None)
-
-    def _row_weights(self, y: NDArray[Any], sample_weight: ArrayLike | None) -> NDArray[np.float64]:
-        weight = np.ones(len(y))
-        if sample_weight is not None:
-            weight = np.asarray(sample_weight, dtype=np.float64).copy()
-            if weight.shape != (len(y),) or not (np.isfinite(weight) & (weight >= 0)).all():
-                raise ValueError(
-                    f"sample_weight must hold {len(y)} finite weights that are not negative, "
-                    f"got the shape {weight.shape}."
-                )
-        if self.class_weight is not None:
-            per_class = compute_class_weight(self.class_weight, classes=self.classes_, y=y)
-            weight *= per_class[np.searchsorted(self.classes_, y)]
-        return weight
-
-    def _split(
-        self, n_rows: int, groups: ArrayLike | None, rng: np.random.Generator
-    ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        seed = int(rng.integers(2**31))
-        units: Any = np.arange(n_rows)
-        if groups is not None:
-            check_consistent_length(np.zeros(n_rows), groups)
-            units = np.unique(np.asarray(groups))
-        n_held_out = min(round(self.validation_fraction * len(units)), len(units) - 1)
-        if n_held_out < 1:
-            return np.arange(n_rows), np.arange(0)
-        splitter = ShuffleSplit if groups is None else GroupShuffleSplit
-        split = splitter(1, test_size=n_held_out, random_state=seed)
-        return next(split.split(np.zeros(n_rows), groups=groups))
+        self.__dict__.pop("_module", None)
+        self.__dict__.pop("_flat", None)
 
     def _check_parameters(self) -> None:
         if self.backend != "mlp" and not isinstance(self.backend, type):
             raise ValueError(
                 f'backend must be "mlp" or a class of torch modules, got {self.backend!r}.'
             )
-        sizes = self.hidden_layer_sizes
-        if not isinstance(sizes, tuple | list) or not all(_is_count(size) for size in sizes):
-            raise ValueError(f"hidden_layer_sizes must be positive integers, got {sizes!r}.")
+        if not isinstance(self.hidden_layer_sizes, tuple | list):
+            raise ValueError(
+                "hidden_layer_sizes must be a tuple of positive integers, "
+                f"got {self.hidden_layer_sizes!r}."
+            )
+        for size in self.hidden_layer_sizes:
+            check_count(size, "Each of hidden_layer_sizes")
         for name in ("max_epochs", "batch_size", "epochs_per_decay"):
-            if not _is_count(getattr(self, name)):
-                raise ValueError(f"{name} must be a positive integer, got {getattr(self, name)!r}.")
-        if self.patience is not None and not _is_count(self.patience):
-            raise ValueError(f"patience must be None or a positive integer, got {self.patience!r}.")
-        limits = {
-            "learning_rate": (0, np.inf),
-            "learning_rate_decay": (0, 1),
-            "validation_fraction": (0, 1),
-        }
-        for name, (low, high) in limits.items():
-            value = getattr(self, name)
-            number = isinstance(value, int | float | np.floating) and not isinstance(value, bool)
-            if not number or not low <= value <= high:
-                raise ValueError(f"{name} must be between {low} and {high}, got {value!r}.")
-
-
-def _is_count(value: Any) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool) and value > 0
-
-
-def _encode(y: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.intp]]:
-    kind = type_of_target(y, input_name="y", raise_unknown=True)
-    if kind != "binary":
-        raise ValueError(
-            f"Only binary classification is supported. The type of the target is {kind}."
-        )
-    return np.unique(y, return_inverse=True)
+            check_count(getattr(self, name), name)
+        if self.patience is not None:
+            check_count(self.patience, "patience")
+        check_number(self.learning_rate, "learning_rate", 0, np.inf)
+        check_number(self.learning_rate_decay, "learning_rate_decay", 0, 1)
+        check_number(self.validation_fraction, "validation_fraction", 0, 1)
 
 
 def _constant_logit(target: NDArray[np.intp], n_classes: int) -> float | None:

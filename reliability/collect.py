@@ -20,7 +20,7 @@ from reliability.labels import UNRELIABLE, label_transitions
 from reliability.transitions import Transitions
 from systems.errors import SimulationDivergedError
 from systems.system import System
-from systems.validation import RandomState, as_generator
+from systems.validation import RandomState, as_seed, check_count
 
 FORMAT_VERSION = 1
 PLANS_PER_SHARD = 50
@@ -90,10 +90,9 @@ def collect_transitions(
     ----------
     McConachie et al. 2020, "Data Generation and Labeling".
     """
-    if not isinstance(n_plans, int | np.integer) or isinstance(n_plans, bool) or n_plans < 1:
-        raise ValueError(f"n_plans must be a positive integer, got {n_plans!r}.")
+    check_count(n_plans, "n_plans")
     store = None if path is None else _ShardFolder(Path(path))
-    seed = _draw_seed(random_state)
+    seed = as_seed(random_state)
     if store is not None:
         seed = store.open(_describe(system, planner, int(n_plans), seed), random_state is None)
     starts = range(0, n_plans, PLANS_PER_SHARD)
@@ -115,13 +114,6 @@ def collect_transitions(
             done[i] = shard
             bar.update()
     return _joined([done[i] for i in range(len(starts))], int(n_plans), verbose)
-
-
-def _draw_seed(random_state: RandomState) -> int:
-    if isinstance(random_state, int | np.integer):
-        as_generator(random_state)
-        return int(random_state)
-    return int(as_generator(random_state).integers(2**63))
 
 
 def _describe(system: System, planner: Planner, n_plans: int, seed: int) -> dict[str, Any]:
@@ -224,12 +216,12 @@ class _ShardFolder:
             description = description | {"random_state": found.get("random_state")}
         differing = [key for key in description if found.get(key) != description[key]]
         if differing:
+            changes = "; ".join(
+                f"{key}: {found.get(key)} then, {description[key]} now" for key in differing
+            )
             raise ValueError(
-                f"path {self._folder} holds data collected with other arguments: "
-                + "; ".join(
-                    f"{key} was {found.get(key)}, is {description[key]}" for key in differing
-                )
-                + ". Choose another path, or remove this one."
+                f"path {self._folder} holds data collected with other arguments ({changes}); "
+                "choose another path, or remove this one."
             )
         return int(found["random_state"])
 

@@ -227,7 +227,9 @@ def _network(
         ),
     ]
     if plan.patience is not None:
-        stop = EarlyStopping("valid_loss", patience=plan.patience, load_best=True, sink=_no_output)
+        stop = EarlyStopping(
+            "valid_loss", patience=plan.patience, threshold=0.0, load_best=True, sink=_no_output
+        )
         callbacks.append(("stop", stop))
     return NeuralNet(
         module,

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reliability.labels import RELIABLE, UNRELIABLE
+from systems.archive import read_arrays, write_arrays
 from systems.system import System
 
 FORMAT_VERSION = 1
@@ -104,12 +103,8 @@ class Transitions:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file; whatever stood there is replaced only when all is written."""
-        target = Path(path)
-        partial = target.with_name(target.name + ".partial")
-        with partial.open("wb") as file:
-            arrays = {field.name: getattr(self, field.name) for field in fields(self)}
-            np.savez(file, format_version=np.array(FORMAT_VERSION), **arrays)
-        os.replace(partial, target)
+        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
+        write_arrays(path, arrays, format_version=FORMAT_VERSION)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Transitions:
@@ -120,19 +115,6 @@ class Transitions:
         ValueError
             If the file is no such file, is truncated, or has another format version.
         """
-        try:
-            with np.load(path, allow_pickle=False) as archive:
-                version = int(archive["format_version"])
-                if version != FORMAT_VERSION:
-                    raise ValueError(
-                        f"{path} has the format version {version} and this library reads "
-                        f"{FORMAT_VERSION}; collect the transitions again, or load them with the "
-                        "version of the library that wrote them."
-                    )
-                return cls(*(archive[field.name] for field in fields(cls)))
-        except (zipfile.BadZipFile, KeyError, EOFError, OSError, AttributeError) as error:
-            if isinstance(error, FileNotFoundError):
-                raise
-            raise ValueError(
-                f"{path} is not a whole file of transitions ({error}); collect them again."
-            ) from error
+        names = {field.name for field in fields(cls)}
+        arrays = read_arrays(path, names, format_version=FORMAT_VERSION, kind="transitions")
+        return cls(**arrays)

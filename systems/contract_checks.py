@@ -40,7 +40,7 @@ def check_system(system: System, *, random_state: int = 0) -> None:
     starts = np.array([_check_reduce(system, problem.start) for problem in problems])
     rng = np.random.default_rng(random_state)
     reduced = starts[rng.integers(len(starts), size=N_ROWS)]
-    targets = rng.uniform(*system.bounds, size=(N_ROWS, system.configuration_dim))
+    targets = _draw(system, rng, N_ROWS)
     command = _check_steer(system, reduced, targets)
     next_reduced, valid = _check_propagate(system, reduced, command)
     _check_steps(system, reduced, next_reduced, valid)
@@ -275,9 +275,14 @@ def _check_features(system: System, reduced: Array, next_reduced: Array) -> None
     _check_rowwise(system, "features", reduced, next_reduced)
 
 
+def _draw(system: System, rng: np.random.Generator, n: int) -> Array:
+    low, high = system.bounds
+    return rng.uniform(low, high, size=(n, system.configuration_dim))
+
+
 def _walk(system: System, problem: Problem, rng: np.random.Generator) -> Array:
     reduced = system.reduce(problem.start)[None]
-    target = rng.uniform(*system.bounds)[None]
+    target = _draw(system, rng, 1)
     commands = []
     for _ in range(5):
         command = system.steer(reduced, target)

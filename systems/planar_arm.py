@@ -116,7 +116,7 @@ class PlanarArm(System):
         it is drawn again.
         """
         rng = as_generator(random_state)
-        return Problem(self._draw_resting_start(rng), rng.uniform(*self.bounds)[None])
+        return Problem(self._draw_resting_start(rng), self._draw_configuration(rng)[None])
 
     def sample_reaching_problem(
         self, random_state: RandomState = None, *, start_at_rest: bool = True
@@ -134,7 +134,7 @@ class PlanarArm(System):
             them before it has moved.
         """
         rng = as_generator(random_state)
-        start = self._draw_resting_start(rng) if start_at_rest else rng.uniform(*self.bounds)
+        start = self._draw_resting_start(rng) if start_at_rest else self._draw_configuration(rng)
         while True:
             target = rng.uniform(-REACH, REACH, 2)
             headings = rng.uniform(-np.pi, np.pi, HEADINGS_PER_TARGET)
@@ -225,9 +225,13 @@ class PlanarArm(System):
         solutions = as_finite_array(goal, "goal", (None, 3))
         return bool((np.linalg.norm(solutions - executed, axis=1) < tolerance).any())
 
+    def _draw_configuration(self, rng: np.random.Generator) -> Array:
+        low, high = self.bounds
+        return rng.uniform(low, high)
+
     def _draw_resting_start(self, rng: np.random.Generator) -> Array:
         while True:
-            start = rng.uniform(*self.bounds)
+            start = self._draw_configuration(rng)
             if self.can_hold(start[None])[0]:
                 return start
 

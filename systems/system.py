@@ -45,14 +45,14 @@ class Rollout:
 
     Attributes
     ----------
-    states : sequence of states
+    states : sequence of states, or array with a state per row
         The start, one state per completed command, then the boundary state if it stopped.
     n_completed : int
         Commands that were carried out to their end.
     stop_reason : StopReason
     """
 
-    states: Sequence[Any]
+    states: Sequence[Any] | Array
     n_completed: int
     stop_reason: StopReason
 

@@ -39,6 +39,27 @@ def as_generator(random_state: RandomState) -> np.random.Generator:
     )
 
 
+def as_seed(random_state: RandomState) -> int:
+    """Return the integer that a ``random_state`` is or gives."""
+    if isinstance(random_state, int | np.integer):
+        as_generator(random_state)
+        return int(random_state)
+    return int(as_generator(random_state).integers(2**63))
+
+
+def check_count(value: Any, name: str) -> None:
+    """Raise ``ValueError`` unless a value is a positive integer."""
+    if not isinstance(value, int | np.integer) or isinstance(value, bool) or int(value) < 1:
+        raise ValueError(f"{name} must be a positive integer, got {value!r}.")
+
+
+def check_number(value: Any, name: str, low: float, high: float) -> None:
+    """Raise ``ValueError`` unless a value is a number between two limits, both allowed."""
+    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    if not number or not low <= value <= high:
+        raise ValueError(f"{name} must be a number between {low} and {high}, got {value!r}.")
+
+
 def as_finite_array(
     values: ArrayLike, name: str, shape: tuple[int | None, ...]
 ) -> NDArray[np.float64]:

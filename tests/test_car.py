@@ -119,7 +119,7 @@ def test_speed_carries_over_and_decides():
     car = Car(CarScene((Circle(1.6, 0.2, 0.5),), (-2.0, -3.0, 4.0, 3.0)))
     pose, command = [0.3, 0.0, 0.0], np.array([[0.75, -0.35, -0.85]])
     assert car.propagate(np.array([pose]), command)[1][0]
-    ends, completed = car.execute([[*pose, v, 0.0] for v in (0.3, 2.0)], np.tile(command, (2, 1)))
+    _, completed = car.execute([[*pose, v, 0.0] for v in (0.3, 2.0)], np.tile(command, (2, 1)))
     assert completed.tolist() == [True, False]
     straight = np.array([[0.5, 0.0, 0.0]])
     slow, fast = car.execute([[-1, 2, 0, 0.2, 0], [-1, 2, 0, 2.5, 0]], np.tile(straight, (2, 1)))[0]

@@ -1,0 +1,30 @@
+# Verbs: arm, test, check, bench, env, clean.
+PYTHON ?= python3.11
+ENV := .venv
+RUN := $(ENV)/bin/python
+
+arm: $(ENV)/ready ## no data to the arm's table and pictures, in build/arm
+	$(RUN) examples/arm.py
+
+test: $(ENV)/ready check ## style, types and tests
+	$(RUN) -m pytest
+
+check: $(ENV)/ready
+	$(RUN) -m ruff check .
+	$(RUN) -m ruff format --check .
+	$(RUN) -m mypy
+
+bench: $(ENV)/ready ## ratios behind the README's claims
+	$(RUN) benchmarks/planning.py
+
+env: $(ENV)/ready
+
+$(ENV)/ready: setup.cfg pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(ENV)
+	$(RUN) -m pip install --quiet --constraint constraints.txt --editable ".[test,examples]"
+	touch $@
+
+clean:
+	rm -rf $(ENV) build *.egg-info
+
+.PHONY: arm test check bench env clean

@@ -1,0 +1,42 @@
+"""Data and a model that several tests share, made once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from toy_systems import Disc
+
+from planners import BiasedRRTConnect
+from reliability import TransitionReliabilityClassifier, collect_transitions
+from systems import PlanarArm
+
+
+@pytest.fixture(scope="session")
+def arm():
+    return PlanarArm()
+
+
+@pytest.fixture(scope="session")
+def arm_transitions(arm):
+    return collect_transitions(arm, BiasedRRTConnect(arm), 150, random_state=0)
+
+
+@pytest.fixture(scope="session")
+def arm_classifier(arm, arm_transitions):
+    classifier = TransitionReliabilityClassifier(max_epochs=12, random_state=0)
+    return classifier.fit(
+        arm_transitions.features(arm), arm_transitions.y, groups=arm_transitions.plan
+    )
+
+
+@pytest.fixture(scope="session")
+def disc_data():
+    """X, y and plan ids of the disc world, whose right edge is Unreliable."""
+    disc = Disc()
+    transitions = collect_transitions(disc, BiasedRRTConnect(disc), 120, random_state=0)
+    return transitions.features(disc), transitions.y, transitions.plan
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(0)

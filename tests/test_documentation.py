@@ -1,0 +1,60 @@
+"""What the documentation shows works, and the packages keep to their order."""
+
+import ast
+import doctest
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+# Each package knows only those before it.
+ROAD = ("systems", "reliability", "planners")
+
+
+@pytest.mark.parametrize(
+    "module", ["reliability.classifier", "planners.rrt", "planners.rrt_connect"]
+)
+def test_docstring_examples_run(module):
+    results = doctest.testmod(importlib.import_module(module))
+    assert results.attempted > 0
+    assert results.failed == 0
+
+
+def test_the_readmes_example_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    readme = (ROOT / "README.md").read_text()
+    code = re.search(r"## How it goes\n\n```python\n(.*?)```", readme, flags=re.S)[1]
+    assert "6000" in code
+    exec(compile(code.replace("6000", "60"), "README.md", "exec"), {})
+    assert "The plan reaches the goal." in capsys.readouterr().out
+    assert (tmp_path / "arm.joblib").exists()
+
+
+@pytest.mark.parametrize("package", ROAD)
+def test_no_import_runs_back_up_the_road(package):
+    later = set(ROAD[ROAD.index(package) + 1 :])
+    for file in (ROOT / package).glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            names = [node.module] if isinstance(node, ast.ImportFrom) else []
+            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            assert not later & {str(name).split(".")[0] for name in names}, file
+
+
+@pytest.mark.parametrize(
+    ("library", "allowed"),
+    [
+        ("mujoco", {"systems/planar_arm.py"}),
+        ("torch", {"reliability/networks.py"}),
+        ("skorch", {"reliability/networks.py"}),
+        ("ompl", {"planners/ompl_search.py"}),
+    ],
+)
+def test_heavy_libraries_have_one_home(library, allowed):
+    pattern = re.compile(rf"^\s*(import|from) {library}\b", flags=re.M)
+    files = [file for package in ROAD for file in (ROOT / package).glob("*.py")]
+    homes = {
+        f"{file.parent.name}/{file.name}" for file in files if pattern.search(file.read_text())
+    }
+    assert homes == allowed

@@ -1,0 +1,39 @@
+"""The examples run, at small size, as a user would run them."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+
+def run(*command, cwd):
+    return subprocess.run(
+        [sys.executable, *map(str, command)],
+        cwd=cwd,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=True,
+    ).stdout
+
+
+def test_arm_example_gives_its_table_and_pictures(tmp_path):
+    script = ROOT / "examples" / "arm.py"
+    options = ("--plans", 60, "--queries", 8, "--jobs", 2, "--out", tmp_path / "out")
+    shown = run(script, *options, cwd=tmp_path)
+    assert "Held-out accuracy" in shown
+    assert "From hanging to standing" in shown
+    assert "Starts at which the arm can rest: successes out of 8" in shown
+    results = json.loads((tmp_path / "out" / "results.json").read_text())
+    planners = results["Starts at which the arm can rest"]
+    assert list(planners) == ["none", "none, holdable goals", "literal", "ours"]
+    assert all(len(records) == 8 for records in planners.values())
+    for name in ("arm.joblib", "motions.png", "success.png"):
+        assert (tmp_path / "out" / name).stat().st_size > 10_000
+    again = run(script, *options, cwd=tmp_path)
+    tables = [text[text.index("Held-out") : text.index("Starts at")] for text in (shown, again)]
+    assert tables[0] == tables[1], "the same seeds, the same models"

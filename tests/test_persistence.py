@@ -1,0 +1,84 @@
+"""Model files: small, complete, and plain about what is wrong with them."""
+
+import joblib
+import numpy as np
+import pytest
+from test_processes import run
+
+from reliability import ModelFileError, TransitionReliabilityClassifier, load_estimator
+
+
+@pytest.fixture
+def saved(arm_classifier, tmp_path):
+    path = tmp_path / "arm.joblib"
+    joblib.dump(arm_classifier, path)
+    return path
+
+
+def test_a_fresh_process_predicts_the_same(saved, arm_classifier, arm, arm_transitions, tmp_path):
+    X = arm_transitions.features(arm)
+    np.save(tmp_path / "X.npy", X)
+    process = run(
+        f"""
+        import joblib, numpy as np
+        model = joblib.load({str(saved)!r})
+        X = np.load({str(tmp_path / "X.npy")!r})
+        np.save({str(tmp_path / "p.npy")!r}, model.predict_proba(X))
+        print(model.validation_accuracy_)
+        """
+    )
+    np.testing.assert_array_equal(np.load(tmp_path / "p.npy"), arm_classifier.predict_proba(X))
+    assert float(process.stdout) == arm_classifier.validation_accuracy_
+
+
+def test_the_file_holds_weights_and_little_else(saved, arm_classifier):
+    n_weights = 12 * 256 + 256 + 256 * 128 + 128 + 128 * 64 + 64 + 64 + 1
+    assert 4 * n_weights < saved.stat().st_size < 4 * n_weights + 10_000
+    state = arm_classifier.__getstate__()
+    assert not any("torch" in type(value).__module__ for value in state.values())
+    assert {"numpy", "scikit-learn", "skorch", "torch"} <= state["_package_versions"].keys()
+
+
+def test_using_a_model_does_not_change_its_file(saved, arm_classifier, tmp_path, rng):
+    arm_classifier.predict(rng.normal(size=(5000, 12)))
+    joblib.dump(arm_classifier, tmp_path / "again.joblib")
+    assert (tmp_path / "again.joblib").read_bytes() == saved.read_bytes()
+
+
+def test_weights_can_be_shared_through_a_memory_map(saved, arm_classifier, rng):
+    X = rng.normal(size=(10, 12))
+    mapped = joblib.load(saved, mmap_mode="r")
+    np.testing.assert_array_equal(mapped.predict_proba(X), arm_classifier.predict_proba(X))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.01, 0.3, 0.99, 0.9999])
+def test_truncated_files_are_refused(saved, share):
+    content = saved.read_bytes()
+    saved.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(ModelFileError, match=r"arm.joblib is truncated or no joblib file .*again"):
+        load_estimator(saved)
+
+
+def test_files_of_another_format_are_refused(saved, arm_classifier, tmp_path):
+    state = arm_classifier.__getstate__() | {"_format_version": 99}
+    with pytest.raises(ModelFileError, match=r"saved in format 99 with .* reads format 1. Load it"):
+        TransitionReliabilityClassifier().__setstate__(state)
+
+
+def test_files_that_need_what_is_not_here_are_refused(tmp_path):
+    run(
+        f"""
+        import joblib, sys, types
+        module = types.ModuleType("elsewhere")
+        class Model: pass
+        Model.__module__ = "elsewhere"; module.Model = Model; sys.modules["elsewhere"] = module
+        joblib.dump(Model(), {str(tmp_path / "model.joblib")!r})
+        """
+    )
+    with pytest.raises(ModelFileError, match=r"can't be imported here .*elsewhere"):
+        load_estimator(tmp_path / "model.joblib")
+
+
+def test_a_missing_file_is_missing(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        load_estimator(tmp_path / "absent.joblib")

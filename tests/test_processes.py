@@ -1,0 +1,143 @@
+"""What can only be seen from outside a process: memory, exit, interruption, imports."""
+
+import signal
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+
+def run(code, **parameters):
+    return subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=True,
+        **parameters,
+    )
+
+
+PLAN = """
+import numpy as np
+from planners import BiasedRRT, BiasedRRTConnect
+from systems import PlanarArm
+
+class Picky:
+    classes_ = np.array([0, 1])
+    validation_accuracy_ = 0.9
+    def predict(self, X):
+        return (X[:, 3] > -0.5).astype(int)
+
+arm = PlanarArm()
+start, goal = np.array([-1.5, 0.3, 0.2]), np.array([[1.5, 0.1, 0.0]])
+"""
+
+
+def test_nothing_complains_at_exit():
+    process = run(
+        PLAN
+        + """
+for planner in (BiasedRRTConnect, BiasedRRT):
+    for estimator in (None, Picky()):
+        kept = planner(arm, estimator, random_state=0)
+        result = kept.plan(start, goal)
+try:
+    BiasedRRT(arm, Picky(), k=np.inf, max_iterations=50).plan(start, -goal)
+    raise KeyError
+except KeyError:
+    print("done")
+"""
+    )
+    assert process.stdout == "done\n"
+    assert process.stderr == ""
+
+
+def test_two_thousand_plans_do_not_grow_memory():
+    process = run(
+        PLAN
+        + """
+import gc, psutil
+def memory():
+    gc.collect()
+    return psutil.Process().memory_info().rss / 2**20
+
+def plan(n):
+    for seed in range(n):
+        planner = (BiasedRRTConnect, BiasedRRT)[seed % 2]
+        estimator = (None, Picky())[seed // 2 % 2]
+        planner(arm, estimator, random_state=seed, max_iterations=300).plan(start, goal)
+
+plan(300)
+before = memory()
+plan(2000)
+print(memory() - before)
+"""
+    )
+    assert float(process.stdout) < 8, "MiB over 2,000 plans"
+
+
+def test_a_fresh_process_plans_the_same():
+    code = PLAN + "print(BiasedRRTConnect(arm, Picky(), random_state=3).plan(start, goal).reduced)"
+    assert run(code).stdout == run(code).stdout
+
+
+@pytest.mark.parametrize("planner", ["BiasedRRTConnect", "BiasedRRT"])
+@pytest.mark.parametrize("fast", [True, False])
+def test_control_c_interrupts_a_search(planner, fast):
+    code = (
+        PLAN
+        + f"""
+class Never(Picky):
+    def predict(self, X):
+        return np.zeros(len(X), dtype=int)
+    if {fast}:
+        def fast_decision_function(self, X):
+            return -np.ones(len(X))
+
+print("searching", flush=True)
+{planner}(arm, Never(), k=np.inf, max_iterations=10**9).plan(start, goal)
+"""
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stdout.readline() == "searching\n"
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(timeout=3)
+        process.send_signal(signal.SIGINT)
+        _, error = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert error.rstrip().endswith("KeyboardInterrupt")
+
+
+def test_importing_the_packages_imports_nothing_heavy():
+    process = run(
+        """
+        import sys
+        import planners, reliability, systems
+        heavy = {"torch", "skorch", "sklearn", "ompl", "mujoco", "pybullet", "numba", "joblib"}
+        print(sorted(heavy & set(sys.modules)))
+        """
+    )
+    assert process.stdout == "[]\n"
+
+
+def test_planning_with_a_loaded_model_needs_no_torch(arm_classifier, tmp_path):
+    import joblib
+
+    joblib.dump(arm_classifier, tmp_path / "model.joblib")
+    process = run(
+        PLAN
+        + f"""
+import sys
+from reliability import load_estimator
+model = load_estimator({str(tmp_path / "model.joblib")!r})
+print(BiasedRRTConnect(arm, model, random_state=0).plan(start, goal).success)
+print("torch" in sys.modules)
+"""
+    )
+    assert process.stdout == "True\nFalse\n"
