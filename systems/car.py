@@ -9,9 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.angles import shortest_way
 from systems.car_dynamics import (
+    LONGEST_COMMAND,
     MAX_SPEED,
+    TIME_STEP,
     execute_commands,
     execute_rows,
+    trace_commands,
 )
 from systems.car_features import transition_features
 from systems.car_geometry import clearances, limited_ways, straight_moves
@@ -35,11 +38,14 @@ class Car(System):
     way. The footprint is everything within 0.15 m of the 0.3 m between the axles. Distances
     between poses count a radian as a metre and angles the short way round.
 
-    The true car accelerates by 2 m/s² at most, turns its wheels by 5 rad/s up to 0.55 rad, and
+    The true car accelerates by 2 m/s² at most, turns its wheels by 6 rad/s up to 0.55 rad, and
     has grip for 2 m/s² across. Γ steers it towards the pose that it is at plus the displacement,
-    forwards or backwards, whichever is the way that the displacement points, at 1.5 m/s or what
-    the bend allows. It ends where the car passes its target, at whatever speed it then has, and
-    the next command begins at that speed.
+    forwards or backwards, whichever way the displacement points, at 1.2 m/s or what the bend
+    allows, and means to be at 0.3 m/s at its target. It ends where the car passes the target, at
+    whatever speed it then has, or after 4 s, and the next command begins at that speed.
+
+    Two poses are Close less than 0.15 m apart: a quarter of the car's length, so that a command
+    to go sideways is Unreliable at once, and a plan's small errors are not.
 
     Parameters
     ----------
@@ -120,8 +126,8 @@ class Car(System):
         Raises
         ------
         ValueError
-            If the state or a command has the wrong shape or is not finite, or the car at its
-            start is inside an obstacle or faster than 2.5 m/s.
+            If the state or a command has the wrong shape or is not finite, or the car touches
+            something at its start.
         """
         start = self._checked_states(as_finite_array(state, "state", (5,))[None])[0]
         moves = as_finite_array(commands, "commands", (None, 3))
@@ -154,8 +160,15 @@ class Car(System):
         moves = as_finite_array(commands, "commands", (len(starts), 3))
         return execute_rows(starts, moves, *self._packed)
 
+    def trace(self, state: ArrayLike, commands: ArrayLike) -> Array:
+        """Return the states of a rollout every 0.01 s, shape (n, 5), for pictures."""
+        start = self._checked_states(as_finite_array(state, "state", (5,))[None])[0]
+        moves = as_finite_array(commands, "commands", (None, 3))
+        states = np.empty((1 + len(moves) * (1 + round(LONGEST_COMMAND / TIME_STEP)), 5))
+        return states[: trace_commands(start, moves, *self._packed, states)]
+
     def close(self, predicted: Array, executed: Array) -> NDArray[np.bool_]:
-        """Say whether poses are less than α = 0.3 (m, rad) apart: Close."""
+        """Say whether poses are less than α = 0.15 (m, rad) apart: Close."""
         return self.distance(predicted, executed) < CLOSE_DISTANCE
 
     def distance(self, one: Array, other: Array) -> Array:
@@ -169,12 +182,12 @@ class Car(System):
         return clearances(poses, *self._packed)
 
     def features(self, reduced: Array, next_reduced: Array) -> Array:
-        """Return (n, 31) rows: the displacement and what is near, in the car's frame."""
+        """Return (n, 37) rows: the displacement and what is near, in the car's frame."""
         _check_rows(reduced, next_reduced)
         return transition_features(reduced, next_reduced, *self._packed)
 
     def sample_problem(self, random_state: RandomState = None) -> Problem:
-        """Draw a pose to go to, and a start at up to 2.5 m/s from which the car can still stop."""
+        """Draw a pose to go to, and a start at up to 2 m/s from which the car can still stop."""
         rng = as_generator(random_state)
         while True:
             pose = self._draw_free_pose(rng)
@@ -195,7 +208,8 @@ class Car(System):
 
     def _draw_free_pose(self, rng: np.random.Generator) -> Array:
         while True:
-            pose = rng.uniform(*self.bounds)
+            low, high = self.bounds
+            pose = rng.uniform(low, high)
             if self.clearance(pose[None])[0] > ROOM_AT_ENDS:
                 return pose
 

@@ -129,8 +129,14 @@ def _stop_at_contact(
 
 @njit(cache=True, nogil=True)
 def execute_command(
-    start: Array, command: Array, hulls: Array, corners: Array, walls: Array, result: Array
-) -> bool:
+    start: Array,
+    command: Array,
+    hulls: Array,
+    corners: Array,
+    walls: Array,
+    result: Array,
+    trace: Array,
+) -> tuple[bool, int]:
     """Drive from a state towards its pose plus a displacement: Γ, once.
 
     Ends where the car passes its target, after 4 s, or at the boundary of an obstacle.
@@ -144,11 +150,14 @@ def execute_command(
         The scene, packed.
     result : ndarray of shape (5,)
         Receives the last state, which touches nothing either.
+    trace : ndarray of shape (m, 5)
+        Receives the first m states on the way, every 0.01 s.
 
     Returns
     -------
     completed : bool
         False if the car came to a boundary.
+    n_traced : int
     """
     target = start[:3] + command
     direction = _direction(start, command)
@@ -156,6 +165,7 @@ def execute_command(
     # How far the car may move before its clearance must be looked at again.
     room = 0.0
     to_go = command[0] ** 2 + command[1] ** 2
+    n_traced = 0
     for _ in range(int(LONGEST_COMMAND / TIME_STEP)):
         if direction == 0 and state[3] == 0:
             break
@@ -173,13 +183,16 @@ def execute_command(
             room = clearance(moved[0], moved[1], moved[2], hulls, corners, walls) - CONTACT
         if room < 0:
             _stop_at_contact(state, speed, curvature, duration, hulls, corners, walls, result)
-            return False
+            return False, n_traced
         state[:] = moved
+        if n_traced < trace.shape[0]:
+            trace[n_traced] = state
+            n_traced += 1
         to_go = left
         if arrives:
             break
     result[:] = state
-    return True
+    return True, n_traced
 
 
 @njit(cache=True, nogil=True)
@@ -202,8 +215,11 @@ def execute_commands(
     n_completed : int
     """
     states[0] = start
+    no_trace = np.empty((0, 5))
     for i in range(commands.shape[0]):
-        if not execute_command(states[i], commands[i], hulls, corners, walls, states[i + 1]):
+        if not execute_command(
+            states[i], commands[i], hulls, corners, walls, states[i + 1], no_trace
+        )[0]:
             return i
     return commands.shape[0]
 
@@ -215,8 +231,37 @@ def execute_rows(
     """Execute one command from each state; return the last states and which were completed."""
     ends = np.empty_like(starts)
     completed = np.empty(starts.shape[0], np.bool_)
+    no_trace = np.empty((0, 5))
     for row in range(starts.shape[0]):
-        completed[row] = execute_command(
-            starts[row], commands[row], hulls, corners, walls, ends[row]
+        completed[row], _ = execute_command(
+            starts[row], commands[row], hulls, corners, walls, ends[row], no_trace
         )
     return ends, completed
+
+
+@njit(cache=True, nogil=True)
+def trace_commands(
+    start: Array, commands: Array, hulls: Array, corners: Array, walls: Array, trace: Array
+) -> int:
+    """Execute commands in turn as :func:`execute_commands`, and record the states on the way.
+
+    Parameters
+    ----------
+    trace : ndarray of shape (1 + T * (1 + LONGEST_COMMAND / TIME_STEP), 5)
+
+    Returns
+    -------
+    n_traced : int
+    """
+    trace[0] = start
+    n = 1
+    result = start.copy()
+    for i in range(commands.shape[0]):
+        completed, n_new = execute_command(
+            trace[n - 1], commands[i], hulls, corners, walls, result, trace[n:]
+        )
+        n += n_new
+        if not completed:
+            trace[n] = result
+            return n + 1
+    return n

@@ -265,3 +265,13 @@ def test_bad_input_is_named():
         car.rollout([1, 1, 0, 0, 0], np.zeros((1, 2)))
     with pytest.raises(ValueError, match="shape"):
         car.propagate(np.zeros(3), np.zeros(3))
+
+
+def test_a_trace_passes_through_the_rollout():
+    car = Car("open_lot")
+    start = car.sample_problem(1).start
+    commands = random_commands(np.random.default_rng(2), 15)
+    rollout, trace = car.rollout(start, commands), car.trace(start, commands)
+    np.testing.assert_array_equal(trace[0], start)
+    np.testing.assert_array_equal(trace[-1], rollout.states[-1])
+    assert all((trace == state).all(axis=1).any() for state in rollout.states)
