@@ -24,7 +24,7 @@ from systems.validation import RandomState, as_finite_array, as_generator
 
 STEP_SIZE = 1.0
 CLOSE_DISTANCE = 0.15
-GOAL_DISTANCE = 1e-6
+GOAL_DISTANCE = CLOSE_DISTANCE
 ROOM_AT_ENDS = 0.05
 
 
@@ -196,7 +196,7 @@ class Car(System):
                 return Problem(start, self._draw_free_pose(rng)[None])
 
     def goal_reached(self, reduced: Array, goal: Array) -> NDArray[np.bool_]:
-        """Say, row by row, whether a pose is one of the goal's: Goal_B."""
+        """Say, row by row, whether a pose is Close to one of the goal's: Goal_B."""
         _check_rows(reduced, goal)
         gaps = shortest_way(reduced[:, None], goal[None], self.angular)
         return (np.linalg.norm(gaps, axis=2) < GOAL_DISTANCE).any(axis=1)
