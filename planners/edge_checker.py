@@ -71,9 +71,10 @@ class EdgeChecker:
         self, starts: Array, ends: Array
     ) -> tuple[NDArray[np.bool_], Array, Array, NDArray[np.int64]]:
         """Return which edges g allows, and those edges' transitions."""
-        origins, targets, edge = split_edges(starts, ends, self._system.step_size)
-        command = self._system.steer(origins, targets)
-        following, valid = self._system.propagate(origins, command)
+        system = self._system
+        origins, targets, edge = split_edges(starts, ends, system.step_size, system.angular)
+        command = system.steer(origins, targets)
+        following, valid = system.propagate(origins, command)
         possible = np.ones(len(starts), dtype=np.bool_)
         if not valid.all():
             possible[edge[~valid]] = False

@@ -6,12 +6,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from systems.angles import wrap_angle
+
 Array = NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)
 def split_edges(
-    starts: Array, ends: Array, step_size: float
+    starts: Array, ends: Array, step_size: float, angular: tuple[int, ...] = ()
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """Cut straight edges into equal transitions no longer than ``step_size``.
 
@@ -19,6 +20,8 @@ def split_edges(
     ----------
     starts, ends : ndarray of shape (n_edges, d)
     step_size : float
+    angular : tuple of int, default=()
+        Entries that are angles, which an edge turns the short way round.
 
     Returns
     -------
@@ -27,6 +30,15 @@ def split_edges(
     edge : ndarray of int of shape (n_transitions,)
         The edge that each transition belongs to.
     """
+    if not angular:
+        return _split_straight(starts, ends, step_size)
+    return _split_turning(starts, ends, step_size, angular)
+
+
+@njit(cache=True, nogil=True)
+def _split_straight(
+    starts: Array, ends: Array, step_size: float
+) -> tuple[Array, Array, NDArray[np.int64]]:
     n_edges, dim = starts.shape
     pieces = np.empty(n_edges, np.int64)
     for e in range(n_edges):
@@ -51,4 +63,23 @@ def split_edges(
                 else:
                     targets[row, i] = ends[e, i]
             row += 1
+    return origins, targets, edge
+
+
+@njit(cache=True, nogil=True)
+def _split_turning(
+    starts: Array, ends: Array, step_size: float, angular: tuple[int, ...]
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    unrolled = ends.copy()
+    for e in range(starts.shape[0]):
+        for i in angular:
+            unrolled[e, i] = starts[e, i] + wrap_angle(ends[e, i] - starts[e, i])
+    origins, targets, edge = _split_straight(starts, unrolled, step_size)
+    for row in range(edge.shape[0]):
+        for i in angular:
+            origins[row, i] = wrap_angle(origins[row, i])
+            targets[row, i] = wrap_angle(targets[row, i])
+        # Rounding must not part an edge's end from the vertex that it leads to.
+        if row + 1 == edge.shape[0] or edge[row + 1] != edge[row]:
+            targets[row] = ends[edge[row]]
     return origins, targets, edge

@@ -8,10 +8,13 @@ from numpy.typing import NDArray
 from planners.check_transition import CheckTransition
 from planners.ompl_search import Clock
 from planners.search_tree import SearchTree
+from systems.angles import shortest_way
 from systems.system import Array, System
 
 EXTENSIONS_PER_ROUND = 8
 GOAL_BIAS = 0.1
+# A share of the step: adding a displacement to a configuration rounds.
+ARRIVED = 1e-9
 
 
 class LockstepRRT:
@@ -41,7 +44,7 @@ class LockstepRRT:
         check: CheckTransition,
         rng: np.random.Generator,
     ) -> None:
-        self.tree = SearchTree(start[None], system.configuration_dim)
+        self.tree = SearchTree(start[None], system.configuration_dim, system.angular)
         self._system = system
         self._goals = goals
         self._check = check
@@ -97,5 +100,6 @@ class LockstepRRT:
         if reached.any():
             self._last = int(added[np.argmax(reached)])
         configurations = following[accepted, : system.configuration_dim]
-        going_on = (configurations != targets[accepted]).any(axis=1)
+        left = shortest_way(configurations, targets[accepted], system.angular)
+        going_on = (np.abs(left) > ARRIVED * system.step_size).any(axis=1)
         return bool(reached.any()), targets[accepted[going_on]], added[going_on]

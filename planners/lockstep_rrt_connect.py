@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from planners.edge_checker import EdgeChecker
 from planners.ompl_search import Clock
 from planners.search_tree import SearchTree
+from systems.angles import shortest_way, wrap_columns
 from systems.system import Array
 
 EXTENSIONS_PER_ROUND = 8
@@ -27,6 +28,8 @@ class LockstepRRTConnect:
     goals : ndarray of shape (n_goals, d)
     checker : EdgeChecker
     longest_edge : float
+    angular : tuple of int
+        Entries that are angles which wrap.
     rng : Generator
     """
 
@@ -37,13 +40,15 @@ class LockstepRRTConnect:
         goals: Array,
         checker: EdgeChecker,
         longest_edge: float,
+        angular: tuple[int, ...],
         rng: np.random.Generator,
     ) -> None:
         self._bounds = bounds
-        self._from_start = SearchTree(start[None], len(start))
-        self._to_goal = SearchTree(goals, len(start))
+        self._from_start = SearchTree(start[None], len(start), angular)
+        self._to_goal = SearchTree(goals, len(start), angular)
         self._checker = checker
         self._longest_edge = longest_edge
+        self._angular = angular
         self._rng = rng
 
     def __call__(self, clock: Clock) -> Array | None:
@@ -65,7 +70,7 @@ class LockstepRRTConnect:
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Grow one edge towards each target; return the new states and which targets they serve."""
         origins = tree.reduced[nearest]
-        ends = _limited(origins, targets, self._longest_edge)
+        ends = _limited(origins, targets, self._longest_edge, self._angular)
         if tree is self._from_start:
             accepted = self._checker.accept(origins, ends)
         else:
@@ -91,8 +96,8 @@ class LockstepRRTConnect:
         return np.concatenate([outward, homeward[::-1][1:]])
 
 
-def _limited(origins: Array, targets: Array, longest: float) -> Array:
-    ways = targets - origins
+def _limited(origins: Array, targets: Array, longest: float, angular: tuple[int, ...]) -> Array:
+    ways = shortest_way(origins, targets, angular)
     lengths = np.linalg.norm(ways, axis=1, keepdims=True)
     scale = np.minimum(1.0, longest / np.maximum(lengths, 1e-300))
-    return np.where(scale < 1, origins + ways * scale, targets)
+    return np.where(scale < 1, wrap_columns(origins + ways * scale, angular), targets)

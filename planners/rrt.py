@@ -102,5 +102,5 @@ class BiasedRRT(BiasedPlanner):
             shortened = shortcuts.shorten(Path(path, commands))
             return shortened.reduced, shortened.commands
         checker = EdgeChecker(self.system, search.check)
-        shorter = shorten(path, checker, self.system.step_size, search.rng)
+        shorter = shorten(path, checker, self.system, search.rng)
         return shorter, self.system.steer(shorter[:-1], shorter[1:])

@@ -23,8 +23,8 @@ class BiasedRRTConnect(BiasedPlanner):
 
     For systems whose reduced state is only a configuration, and which can be steered exactly from
     one configuration to another. OMPL's own RRT-Connect searches when the estimator answers
-    quickly for single transitions; for all other estimators, one that asks about the edges of
-    several extensions at a time.
+    quickly for single transitions; for all other estimators, and for configurations with angles
+    that wrap, one that asks about the edges of several extensions at a time.
 
     Parameters
     ----------
@@ -100,10 +100,10 @@ class BiasedRRTConnect(BiasedPlanner):
         if vertices is None:
             path, simplification_time = search.start[None], 0.0
         else:
-            path = _transition_states(vertices, self.system.step_size)
+            path = _transition_states(vertices, self.system)
             began = time.perf_counter()
             if self.simplify:
-                path = shorten(path, checker, self.system.step_size, search.rng)
+                path = shorten(path, checker, self.system, search.rng)
             simplification_time = time.perf_counter() - began
         return Found(
             status=status,
@@ -116,7 +116,8 @@ class BiasedRRTConnect(BiasedPlanner):
     def _vertices(self, search: Search, checker: EdgeChecker) -> tuple[PlanStatus, Array | None]:
         problem = (self.system.bounds, search.start, search.goals)
         longest_edge = self.transitions_per_edge * self.system.step_size
-        if search.check.answers_fast:
+        # OMPL adds up the distances of a compound space where we want the Euclidean one.
+        if search.check.answers_fast and not self.system.angular:
             return rrt_connect(
                 *problem,
                 checker,
@@ -124,11 +125,13 @@ class BiasedRRTConnect(BiasedPlanner):
                 budget=search.budget,
                 seed=search.ompl_seed,
             )
-        lockstep = LockstepRRTConnect(*problem, checker, longest_edge, search.rng)
+        lockstep = LockstepRRTConnect(
+            *problem, checker, longest_edge, self.system.angular, search.rng
+        )
         return search_as_planner(*problem, lockstep, budget=search.budget, seed=search.ompl_seed)
 
 
-def _transition_states(vertices: Array, step_size: float) -> Array:
+def _transition_states(vertices: Array, system: System) -> Array:
     """Return the states along a path's edges, cut as they were when they were checked."""
-    origins, targets, _ = split_edges(vertices[:-1], vertices[1:], step_size)
+    origins, targets, _ = split_edges(vertices[:-1], vertices[1:], system.step_size, system.angular)
     return np.concatenate([origins[:1], targets])

@@ -17,10 +17,13 @@ class SearchTree:
     roots : ndarray of shape (n_roots, reduced_dim)
     configuration_dim : int
         Leading entries of a reduced state that distances are measured in.
+    angular : tuple of int, default=()
+        Entries that are angles which wrap.
     """
 
-    def __init__(self, roots: Array, configuration_dim: int) -> None:
+    def __init__(self, roots: Array, configuration_dim: int, angular: tuple[int, ...] = ()) -> None:
         self._dim = configuration_dim
+        self._wraps = np.isin(np.arange(configuration_dim), angular)
         self._reduced = np.array(roots)
         self._parents = np.full(len(roots), -1)
         self._size = len(roots)
@@ -50,6 +53,8 @@ class SearchTree:
 
     def nearest(self, configurations: Array) -> NDArray[np.int64]:
         """Return the index of the state nearest to each configuration, (m, configuration_dim)."""
+        if self._wraps.any():
+            return nearest_wrapped_rows(self._reduced, self._size, self._wraps, configurations)
         return nearest_rows(self._reduced, self._size, self._dim, configurations)
 
     def branch(self, index: int) -> NDArray[np.int64]:
@@ -89,6 +94,40 @@ def nearest_rows(rows: Array, n_rows: int, dim: int, queries: Array) -> NDArray[
             squared = 0.0
             for i in range(dim):
                 squared += (rows[row, i] - queries[query, i]) ** 2
+            if squared < smallest:
+                smallest = squared
+                nearest[query] = row
+    return nearest
+
+
+@njit(cache=True, nogil=True)
+def nearest_wrapped_rows(
+    rows: Array, n_rows: int, wraps: NDArray[np.bool_], queries: Array
+) -> NDArray[np.int64]:
+    """Return what :func:`nearest_rows` does, with distances the short way round.
+
+    Parameters
+    ----------
+    rows : ndarray of shape (capacity, at least d)
+    n_rows : int
+    wraps : ndarray of bool of shape (d,)
+        Which entries are angles in [-π, π].
+    queries : ndarray of shape (m, d)
+
+    Returns
+    -------
+    nearest : ndarray of int of shape (m,)
+    """
+    nearest = np.empty(queries.shape[0], np.int64)
+    for query in range(queries.shape[0]):
+        smallest = np.inf
+        for row in range(n_rows):
+            squared = 0.0
+            for i in range(wraps.shape[0]):
+                gap = abs(rows[row, i] - queries[query, i])
+                if wraps[i] and gap > np.pi:
+                    gap = 2 * np.pi - gap
+                squared += gap * gap
             if squared < smallest:
                 smallest = squared
                 nearest[query] = row

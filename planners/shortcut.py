@@ -6,14 +6,15 @@ import numpy as np
 
 from planners.edge_checker import EdgeChecker
 from planners.edges import split_edges
-from systems.system import Array
+from systems.angles import shortest_way
+from systems.system import Array, System
 
 ROUNDS = 12
 PROPOSALS_PER_ROUND = 8
 SMALLEST_SAVING = 1e-6
 
 
-def shorten(path: Array, checker: EdgeChecker, step_size: float, rng: np.random.Generator) -> Array:
+def shorten(path: Array, checker: EdgeChecker, system: System, rng: np.random.Generator) -> Array:
     """Replace parts of a path by straight lines that are at least as reliable.
 
     Every transition of a shortcut must be classified Reliable, in the direction in which it will
@@ -26,7 +27,7 @@ def shorten(path: Array, checker: EdgeChecker, step_size: float, rng: np.random.
     path : ndarray of shape (T + 1, configuration_dim)
         One state per transition.
     checker : EdgeChecker
-    step_size : float
+    system : System
     rng : Generator
 
     Returns
@@ -37,7 +38,7 @@ def shorten(path: Array, checker: EdgeChecker, step_size: float, rng: np.random.
     for _ in range(ROUNDS):
         if len(path) <= 2:
             break
-        first, last, saving = _propose(path, rng)
+        first, last, saving = _propose(path, system.angular, rng)
         if len(first) == 0:
             continue
         reliable, doubt = checker.appraise(path[first], path[last])
@@ -46,7 +47,9 @@ def shorten(path: Array, checker: EdgeChecker, step_size: float, rng: np.random.
         best = int(np.argmax(saving))
         if saving[best] > 0:
             start, end = first[best], last[best]
-            origins, straight, _ = split_edges(path[start][None], path[end][None], step_size)
+            origins, straight, _ = split_edges(
+                path[start][None], path[end][None], system.step_size, system.angular
+            )
             doubts = np.concatenate(
                 [doubts[:start], checker.doubts(origins, straight), doubts[end:]]
             )
@@ -54,13 +57,16 @@ def shorten(path: Array, checker: EdgeChecker, step_size: float, rng: np.random.
     return path
 
 
-def _propose(path: Array, rng: np.random.Generator) -> tuple[Array, Array, Array]:
+def _propose(
+    path: Array, angular: tuple[int, ...], rng: np.random.Generator
+) -> tuple[Array, Array, Array]:
     """Draw pairs of states with a detour between them, and the length that each would save."""
     pairs = np.sort(rng.integers(len(path), size=(PROPOSALS_PER_ROUND, 2)), axis=1)
     pairs[0] = 0, len(path) - 1
     first, last = pairs.T
-    lengths = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    lengths = np.linalg.norm(shortest_way(path[:-1], path[1:], angular), axis=1)
     travelled = np.concatenate([[0.0], np.cumsum(lengths)])
-    saving = travelled[last] - travelled[first] - np.linalg.norm(path[last] - path[first], axis=1)
+    direct = np.linalg.norm(shortest_way(path[first], path[last], angular), axis=1)
+    saving = travelled[last] - travelled[first] - direct
     worthwhile = saving > SMALLEST_SAVING
     return first[worthwhile], last[worthwhile], saving[worthwhile]

@@ -9,6 +9,8 @@ from systems.errors import SimulationDivergedError, SystemContractError
 from systems.system import Problem, Rollout, StopReason, System
 
 if TYPE_CHECKING:
+    from systems.car import Car
+    from systems.car_scenes import CarScene, Circle, ConvexPolygon, random_car_scene
     from systems.contract_checks import check_system
     from systems.obstacles import Box, Capsule, Cylinder
     from systems.planar_arm import PlanarArm
@@ -18,6 +20,10 @@ if TYPE_CHECKING:
 __all__ = [
     "Box",
     "Capsule",
+    "Car",
+    "CarScene",
+    "Circle",
+    "ConvexPolygon",
     "Cylinder",
     "PlanarArm",
     "Problem",
@@ -29,16 +35,22 @@ __all__ = [
     "System",
     "SystemContractError",
     "check_system",
+    "random_car_scene",
 ]
 
 _HOMES = {
     "Box": "systems.obstacles",
     "Capsule": "systems.obstacles",
+    "Car": "systems.car",
+    "CarScene": "systems.car_scenes",
+    "Circle": "systems.car_scenes",
+    "ConvexPolygon": "systems.car_scenes",
     "Cylinder": "systems.obstacles",
     "PlanarArm": "systems.planar_arm",
     "Rope": "systems.rope",
     "Scene": "systems.rope_scene",
     "check_system": "systems.contract_checks",
+    "random_car_scene": "systems.car_scenes",
 }
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from systems.angles import shortest_way
 from systems.errors import SystemContractError
 from systems.system import Array, Problem, Rollout, StopReason, System
 
@@ -118,6 +119,25 @@ def _check_attributes(system: System) -> None:
     low, high = np.asarray(system.bounds, dtype=float)
     if not (np.isfinite(low) & np.isfinite(high) & (low < high)).all():
         _fail(system, "bounds", f"must be finite, lower < upper, got {low} and {high}.")
+    _check_angular(system)
+
+
+def _check_angular(system: System) -> None:
+    angular, dim = system.angular, system.configuration_dim
+    indices = isinstance(angular, tuple) and all(isinstance(i, int | np.integer) for i in angular)
+    if not indices or len(set(angular)) < len(angular) or not set(angular) <= set(range(dim)):
+        _fail(
+            system,
+            "angular",
+            f"must be a tuple of different indices from 0 to {dim - 1}, got {angular!r}.",
+        )
+    limits = system.bounds[:, list(angular)]
+    if (np.abs(limits) > np.pi).any():
+        _fail(
+            system,
+            "bounds",
+            f"must lie in [-π, π] for angles that wrap, got {limits.tolist()}.",
+        )
 
 
 def _check_pickles(system: System) -> None:
@@ -220,6 +240,9 @@ def _check_propagate(system: System, reduced: Array, command: Array) -> tuple[Ar
             f"must return next_reduced of shape {reduced.shape}, got {np.shape(next_reduced)}.",
         )
     _check_array(system, "propagate", next_reduced[valid], (valid.sum(), system.reduced_dim))
+    angles = next_reduced[valid][:, list(system.angular)]
+    if ((angles < -np.pi) | (angles >= np.pi)).any():
+        _fail(system, "propagate", "must return angles that wrap in [-π, π).")
     if valid.any():
         _check_rowwise(system, "propagate", reduced[valid], command[valid])
     return next_reduced, valid
@@ -227,7 +250,8 @@ def _check_propagate(system: System, reduced: Array, command: Array) -> tuple[Ar
 
 def _check_steps(system: System, reduced: Array, next_reduced: Array, valid: Any) -> None:
     moved = next_reduced[valid, : system.configuration_dim]
-    lengths = np.linalg.norm(moved - reduced[valid, : system.configuration_dim], axis=1)
+    configurations = reduced[valid, : system.configuration_dim]
+    lengths = np.linalg.norm(shortest_way(configurations, moved, system.angular), axis=1)
     if (lengths > system.step_size * (1 + 1e-6)).any():
         _fail(
             system,
@@ -237,7 +261,8 @@ def _check_steps(system: System, reduced: Array, next_reduced: Array, valid: Any
         )
     there = system.steer(reduced[valid], moved)
     arrived, still_valid = system.propagate(reduced[valid], there)
-    gap = np.abs(arrived[still_valid, : system.configuration_dim] - moved[still_valid])
+    reached = arrived[still_valid, : system.configuration_dim]
+    gap = np.abs(shortest_way(reached, moved[still_valid], system.angular))
     if (gap > 1e-6).any():
         _fail(
             system,

@@ -79,6 +79,9 @@ class System(ABC):
         Largest change ‖q' − q‖ of one transition.
     bounds : ndarray of shape (2, configuration_dim)
         Lower and upper limits of the configurations that planners sample.
+    angular : tuple of int, default=()
+        Indices of the configuration's entries that are angles which wrap. They are in [-π, π),
+        and planners measure and steer the short way round; so must ``steer`` and ``propagate``.
 
     References
     ----------
@@ -89,6 +92,7 @@ class System(ABC):
     configuration_dim: int
     step_size: float
     bounds: Array
+    angular: tuple[int, ...] = ()
 
     @abstractmethod
     def reduce(self, state: Any) -> Array:

@@ -1,0 +1,142 @@
+"""The paper's car, from no data to tables and pictures, in scenes never trained on.
+
+Collects transitions in random scenes, in rounds, trains a classifier, and compares planners on
+random queries in other random scenes: without the classifier, with it, and one that may execute
+every transition that it considers. Then measures how noisy the labels are that the reduced state
+allows. Everything goes to ``--out``; a run that was interrupted goes on after its last round.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+from car_collection import collect_round, informative, train
+from car_noise import measure_noise, print_noise
+from car_pictures import draw_all
+from car_planners import BETA, PLANNERS, execute, plan_query
+from scipy.stats import binomtest
+
+from reliability import RELIABLE, Transitions
+from systems import Car, CarScene, random_car_scene
+
+TEST_SCENE_SEED, QUERY_SEED = 11, 12
+SHIPPED = ("open_lot", "slalom", "narrow_gate")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the experiment."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=int, default=100, help="training scenes per round")
+    parser.add_argument("--plans", type=int, default=30, help="plans per scene and round")
+    parser.add_argument("--rounds", type=int, default=5, help="rounds of collecting")
+    parser.add_argument("--test-scenes", type=int, default=40, help="scenes to test in")
+    parser.add_argument("--queries", type=int, default=10, help="queries per test scene")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
+    parser.add_argument("--out", type=Path, default=Path("build/car"))
+    options = parser.parse_args(arguments)
+    options.out.mkdir(parents=True, exist_ok=True)
+
+    classifier = learn(options)
+    joblib.dump(classifier, options.out / "car.joblib")
+    unseen = [
+        random_car_scene(np.random.SeedSequence([TEST_SCENE_SEED, i]))
+        for i in range(options.test_scenes)
+    ]
+    results = {
+        "Random scenes": experiment(unseen, classifier, options),
+        "The three shipped scenes": experiment(
+            [Car(name).scene for name in SHIPPED], classifier, options
+        ),
+    }
+    for title, records in results.items():
+        print_table(title, records)
+    (options.out / "results.json").write_text(json.dumps(results, indent=1) + "\n")
+    noise = measure_noise(classifier, unseen)
+    print_noise(noise, classifier.validation_accuracy_)
+    draw_all(classifier, noise, options.out)
+    print(f"Pictures and results are in {options.out}.")
+
+
+def learn(options: argparse.Namespace) -> Any:
+    """Collect and train, again and again; each round plans with what the last one learned."""
+    parts, rows, classifier = [], [], None
+    for number in range(options.rounds):
+        began = time.perf_counter()
+        # Plans without a classifier are cheap, and end early in what can be learned from.
+        n_plans = options.plans * (4 if number == 0 else 1)
+        part, X = collect_round(
+            number, classifier, options.scenes, n_plans, options.jobs, options.out
+        )
+        parts.append(part)
+        rows.append(X)
+        transitions, all_rows = Transitions.concatenate(parts), np.concatenate(rows)
+        classifier = train(transitions, all_rows)
+        kept = informative(transitions)
+        print(
+            f"Round {number}: {len(part):,} transitions, "
+            f"{np.mean(part.y == RELIABLE):.0%} Reliable; "
+            f"{kept.sum():,} to learn from so far, "
+            f"{np.mean(transitions.y[kept] == RELIABLE):.0%} Reliable; "
+            f"p_acc {classifier.validation_accuracy_:.3f}; {time.perf_counter() - began:.0f} s"
+        )
+    return classifier
+
+
+def experiment(
+    scenes: list[CarScene], classifier: Any, options: argparse.Namespace
+) -> dict[str, list[dict[str, float]]]:
+    """Answer the same queries with every planner; return a record per query and planner."""
+    answered = joblib.Parallel(n_jobs=options.jobs)(
+        joblib.delayed(answer)(scene, i, classifier, options.queries)
+        for i, scene in enumerate(scenes)
+    )
+    return {name: [row for part in answered for row in part[name]] for name in PLANNERS}
+
+
+def answer(
+    scene: CarScene, number: int, classifier: Any, n_queries: int
+) -> dict[str, list[dict[str, float]]]:
+    """Plan and execute the queries of one scene."""
+    car = Car(scene)
+    records: dict[str, list[dict[str, float]]] = {name: [] for name in PLANNERS}
+    for name in PLANNERS:
+        # Compiled code is loaded on first use, which is no part of planning.
+        plan_query(name, scene, classifier, car.sample_problem(0), 0)
+    for query in range(n_queries):
+        problem = car.sample_problem(np.random.SeedSequence([QUERY_SEED, number, query]))
+        for name in PLANNERS:
+            result = plan_query(name, scene, classifier, problem, 1000 * number + query)
+            records[name].append(execute(scene, problem, result))
+    return records
+
+
+def print_table(title: str, results: dict[str, list[dict[str, float]]]) -> None:
+    """Print successes with intervals, what became of the rest, and times."""
+    n = len(next(iter(results.values())))
+    print(f"\n{title}: {n} queries, success within {BETA} (m, rad) of the goal")
+    print(f"{'':12s} success   95 % interval   hit  astray  no plan   transitions  median (ms)")
+    for name, records in results.items():
+        hits = sum(record["hit"] for record in records)
+        unsolved = sum(not record["solved"] for record in records)
+        good = sum(record["distance"] < BETA for record in records)
+        interval = binomtest(good, n).proportion_ci(method="wilson")
+        length = np.mean([record["n_transitions"] for record in records if record["solved"]])
+        spent = np.median([record["milliseconds"] for record in records])
+        print(
+            f"{name:12s} {good / n:7.1%}   {interval.low:.1%} - {interval.high:.1%}"
+            f" {hits:5d} {n - good - hits - unsolved:7d} {unsolved:8d} {length:13.1f}"
+            f" {spent:12.1f}"
+        )
+
+
+if __name__ == "__main__":
+    sys.stdout.reconfigure(line_buffering=True)
+    main()
