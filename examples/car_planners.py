@@ -8,9 +8,11 @@ import numpy as np
 
 from planners import BiasedRRT, BiasedRRTConnect, PlanResult
 from systems import Car, CarScene, Problem
+from systems.angles import shortest_way
 
 PLANNERS = ("none", "ours", "ceiling")
 BETA = 0.3
+MOST_STRAYED = 0.3
 
 
 class TrueCar(Car):
@@ -26,8 +28,13 @@ class TrueCar(Car):
         return np.array(state, dtype=np.float64)
 
     def propagate(self, reduced: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Execute; a transition that comes to a boundary has no successor."""
-        return self.execute(reduced, command)
+        """Execute; what comes to a boundary, or far from its target, has no successor."""
+        following, completed = self.execute(reduced, command)
+        target = reduced[:, :3] + command
+        left = np.linalg.norm(shortest_way(following[:, :3], target, self.angular), axis=1)
+        length = np.linalg.norm(command, axis=1)
+        # The planner asks once whether the start is one from which the car can stand still.
+        return following, completed & ((left < length + MOST_STRAYED) | (length == 0))
 
     def steer(self, reduced: np.ndarray, configuration: np.ndarray) -> np.ndarray:
         """Steer as if the speed did not matter."""
