@@ -33,7 +33,7 @@ _MIN_GAIN = 1e-10
 _MIN_MOVE = 5e-5
 _MARGIN = 1e-7
 _N_TRIES = 3
-_N_SLIDES = 3
+_N_SLIDES = 2
 _SLIDE_FACTOR = 1.1  # more than 1 leads away from the obstacle, and is not blocked again
 
 
