@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from planners.check_transition import CheckTransition
+from systems.angles import shortest_way
 from systems.system import Array, System
 
-ROUNDS = 200
+ROUNDS = 500
 LONGEST_SHORTCUT = 40
 SMALLEST_SAVING = 1e-6
 # A share of the step: adding a displacement to a configuration rounds.
@@ -37,6 +38,9 @@ class Path:
 
 class CarriedShortcuts:
     """Makes plans shorter by straight lines, of which every transition is checked.
+
+    Half of the lines are of the whole configuration; where the system has parts that move
+    independently, the others are of one part, while the rest goes on as it did.
 
     A shortcut is taken if g allows every transition of it and of the plan's rest, the plan still
     ends in a goal, and every transition that is not bit by bit one of the old plan's is
@@ -77,8 +81,9 @@ class CarriedShortcuts:
             if len(path.commands) < 2:
                 break
             first, last = self._propose(len(path.reduced))
-            if self._saving(path, first, last) > SMALLEST_SAVING:
-                path = self._with_shortcut(path, first, last) or path
+            way = self._shorter_way(path.reduced[first : last + 1, : self._dim], self._draw_part())
+            if way is not None:
+                path = self._with_shortcut(path, first, last, way) or path
         return path
 
     def _propose(self, n_states: int) -> tuple[int, int]:
@@ -86,26 +91,42 @@ class CarriedShortcuts:
         length = int(self._rng.integers(2, LONGEST_SHORTCUT + 1))
         return first, min(first + length, n_states - 1)
 
-    def _saving(self, path: Path, first: int, last: int) -> float:
-        corners = path.reduced[first : last + 1, : self._dim]
-        travelled = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()
-        return float(travelled - np.linalg.norm(corners[-1] - corners[0]))
+    def _draw_part(self) -> slice | None:
+        parts = self._system.independent_parts
+        drawn = int(self._rng.integers(2 * max(1, len(parts))))
+        return parts[drawn] if drawn < len(parts) else None
 
-    def _with_shortcut(self, path: Path, first: int, last: int) -> Path | None:
-        """Return the plan with one shortcut, or None where that may not be taken."""
-        start, target = path.reduced[first], path.reduced[last, : self._dim]
-        straight = self._go_straight(start, target, last - first)
-        if straight is None or not self._all_reliable(straight):
+    def _shorter_way(self, corners: Array, part: slice | None) -> Array | None:
+        """Return configurations at most a step apart, or None if straightening saves nothing."""
+        moves = shortest_way(corners[:-1], corners[1:], self._system.angular)
+        line = corners[0] + np.concatenate([np.zeros((1, self._dim)), np.cumsum(moves, axis=0)])
+        if part is None:
+            straight = line[[0, -1]]
+        else:
+            others = np.delete(moves, np.arange(self._dim)[part], axis=1)
+            straight = line.copy()
+            ratio = _ratios(others)[:, None]
+            straight[:, part] = line[0, part] + ratio * (line[-1, part] - line[0, part])
+        travelled = np.linalg.norm(np.diff(straight, axis=0), axis=1).sum()
+        if np.linalg.norm(moves, axis=1).sum() - travelled <= SMALLEST_SAVING:
             return None
-        rest = self._follow(straight.reduced[-1], path, last)
+        n_steps = max(1, int(np.ceil(travelled / self._system.step_size - ARRIVED)))
+        return _resampled(straight, n_steps) if n_steps <= len(moves) else None
+
+    def _with_shortcut(self, path: Path, first: int, last: int, way: Array) -> Path | None:
+        """Return the plan with one shortcut, or None where that may not be taken."""
+        shortcut = self._go(path.reduced[first], way)
+        if shortcut is None or not self._all_reliable(shortcut):
+            return None
+        rest = self._follow(shortcut.reduced[-1], path, last)
         if rest is None:
             return None
         followed, n_followed = rest
         if not self._all_reliable(followed):
             return None
         kept = last + n_followed
-        reduced = [path.reduced[:first], straight.reduced, followed.reduced[1:]]
-        commands = [path.commands[:first], straight.commands, followed.commands]
+        reduced = [path.reduced[:first], shortcut.reduced, followed.reduced[1:]]
+        commands = [path.commands[:first], shortcut.commands, followed.commands]
         joined = Path(
             np.concatenate([*reduced, path.reduced[kept + 1 :]]),
             np.concatenate([*commands, path.commands[kept:]]),
@@ -113,15 +134,13 @@ class CarriedShortcuts:
         arrives = self._system.goal_reached(joined.reduced[-1:], self._goals)[0]
         return joined if arrives else None
 
-    def _go_straight(self, start: Array, target: Array, most_steps: int) -> Path | None:
-        """Go straight to a configuration; None if that is not allowed or takes too long."""
+    def _go(self, start: Array, way: Array) -> Path | None:
+        """Go from one configuration to the next; None where that is not allowed."""
         states: list[Array] = [start]
         commands: list[Array] = []
-        while not self._arrived(states[-1], target):
-            if len(commands) == most_steps:
-                return None
+        for target in way:
             step = self._step(states[-1], target)
-            if step is None:
+            if step is None or not self._arrived(step[1], target):
                 return None
             commands.append(step[0])
             states.append(step[1])
@@ -152,7 +171,7 @@ class CarriedShortcuts:
         return (command[0], following[0]) if valid[0] else None
 
     def _arrived(self, state: Array, target: Array) -> bool:
-        gap = np.abs(state[: self._dim] - target).max()
+        gap = np.abs(shortest_way(state[: self._dim], target, self._system.angular)).max()
         return bool(gap <= ARRIVED * self._system.step_size)
 
     def _all_reliable(self, path: Path) -> bool:
@@ -162,3 +181,20 @@ class CarriedShortcuts:
             if not self._check.classify(before[part], after[part]).all():
                 return False
         return True
+
+
+def _ratios(moves: Array) -> Array:
+    """Share of the way travelled at each corner, from 0 to 1; evenly spaced if there is none."""
+    lengths = np.linalg.norm(moves, axis=1)
+    if lengths.sum() <= 0.0:
+        lengths = np.ones(len(moves))
+    travelled = np.concatenate([[0.0], np.cumsum(lengths)])
+    return travelled / travelled[-1]
+
+
+def _resampled(line: Array, n_steps: int) -> Array:
+    """Return the ends of steps of one length along a polyline, its last corner exactly."""
+    at_corners = _ratios(np.diff(line, axis=0))
+    at_ends = np.linspace(0.0, 1.0, n_steps + 1)[1:]
+    columns = [np.interp(at_ends, at_corners, column) for column in line.T]
+    return np.column_stack(columns)

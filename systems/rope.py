@@ -60,6 +60,7 @@ class Rope(System):
 
     configuration_dim = 6
     step_size = STEP_SIZE
+    independent_parts = (slice(0, 3), slice(3, 6))
 
     def __init__(self, scene: str | Scene = "simple_hook", engine: str = "mujoco") -> None:
         if isinstance(scene, str):

@@ -82,6 +82,9 @@ class System(ABC):
     angular : tuple of int, default=()
         Indices of the configuration's entries that are angles which wrap. They are in [-π, π),
         and planners measure and steer the short way round; so must ``steer`` and ``propagate``.
+    independent_parts : tuple of slice, default=()
+        Parts of the configuration that can move while the rest stands still, as either gripper
+        of the rope. Planners also shorten the ways of one part alone.
 
     References
     ----------
@@ -93,6 +96,7 @@ class System(ABC):
     step_size: float
     bounds: Array
     angular: tuple[int, ...] = ()
+    independent_parts: tuple[slice, ...] = ()
 
     @abstractmethod
     def reduce(self, state: Any) -> Array:
