@@ -25,6 +25,8 @@ class SearchTree:
         self._dim = configuration_dim
         self._wraps = np.isin(np.arange(configuration_dim), angular)
         self._reduced = np.array(roots)
+        # A copy side by side: whole states lie too far apart in memory to be searched through.
+        self._configurations = np.array(roots[:, :configuration_dim])
         self._parents = np.full(len(roots), -1)
         self._size = len(roots)
 
@@ -44,9 +46,11 @@ class SearchTree:
         if new_size > len(self._reduced):
             capacity = max(2 * len(self._reduced), new_size, 256)
             self._reduced = np.resize(self._reduced, (capacity, self._reduced.shape[1]))
+            self._configurations = np.resize(self._configurations, (capacity, self._dim))
             self._parents = np.resize(self._parents, capacity)
         added = np.arange(self._size, new_size)
         self._reduced[added] = reduced
+        self._configurations[added] = reduced[:, : self._dim]
         self._parents[added] = parents
         self._size = new_size
         return added
@@ -54,8 +58,10 @@ class SearchTree:
     def nearest(self, configurations: Array) -> NDArray[np.int64]:
         """Return the index of the state nearest to each configuration, (m, configuration_dim)."""
         if self._wraps.any():
-            return nearest_wrapped_rows(self._reduced, self._size, self._wraps, configurations)
-        return nearest_rows(self._reduced, self._size, self._dim, configurations)
+            return nearest_wrapped_rows(
+                self._configurations, self._size, self._wraps, configurations
+            )
+        return nearest_rows(self._configurations, self._size, self._dim, configurations)
 
     def branch(self, index: int) -> NDArray[np.int64]:
         """Return the indices from a root to a state."""
@@ -68,7 +74,7 @@ class SearchTree:
     def edges(self) -> Array:
         """Return (parent, child) pairs of configurations, shape (n_edges, 2, configuration_dim)."""
         children = np.flatnonzero(self.parents >= 0)
-        configurations = self.reduced[:, : self._dim]
+        configurations = self._configurations[: self._size]
         return np.stack([configurations[self.parents[children]], configurations[children]], axis=1)
 
 

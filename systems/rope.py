@@ -28,7 +28,7 @@ STEP_SIZE = 0.025
 GOAL_DISTANCE = 0.025
 # Starts are no nearer to the goal than this share of the scene's own way: from behind all
 # obstacles there is nothing to learn.
-LEAST_WAY = 0.5
+LEAST_WAY = 0.75
 
 _MOST_DRAWS = 1000
 
@@ -150,8 +150,10 @@ class Rope(System):
         """Draw a start at which the rope hangs at rest; the goal is the scene's.
 
         Gripper A is uniform in the clear part of the world and gripper B in what the rope at
-        rest reaches of it, as long as the rope between them hangs free of obstacles and the
-        goal is at least half as far away as from the scene's start.
+        rest reaches of it, as long as the rope between them hangs free of obstacles, the goal
+        is at least three quarters as far away as from the scene's start, and each gripper is on
+        its own side: nearer to where it starts in the scene than to where the other one does.
+        With both on one side, ropes rarely get caught.
         """
         rng = as_generator(random_state)
         for _ in range(_MOST_DRAWS):
@@ -214,8 +216,11 @@ class Rope(System):
     def _draw_hanging_rope(self, rng: np.random.Generator) -> Array | None:
         length = self.scene.rope_length
         grippers = self._draw_grippers(rng, 1, length).reshape(2, 3)
-        way = np.linalg.norm(self.scene.goal - grippers)
-        if way < LEAST_WAY * np.linalg.norm(self.scene.goal - self.scene.start):
+        start, goal = self.scene.start, self.scene.goal
+        if np.linalg.norm(goal - grippers) < LEAST_WAY * np.linalg.norm(goal - start):
+            return None
+        own = np.linalg.norm(grippers - start, axis=1)
+        if (own > np.linalg.norm(grippers - start[::-1], axis=1)).any():
             return None
         finely = 1 + 4 * round(length / NODE_SPACING)
         rope = hanging_rope(grippers, length, finely)

@@ -1,0 +1,157 @@
+"""Rope scenes drawn at random, to learn from more than one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from systems.obstacles import Box, Capsule, Cylinder, Obstacle
+from systems.rope_scene import NODE_SPACING, Scene
+from systems.validation import RandomState, as_generator
+
+LEAST_LINKS, MOST_LINKS = 25, 70
+WALL_THICKNESS = 0.05
+
+_HEIGHT = 0.4
+_HALF_LENGTH = 1.3
+_MOST_DRAWS = 1000
+Range = tuple[float, float]
+
+
+def random_rope_scene(random_state: RandomState = None) -> Scene:
+    """Draw a scene in which a rope has to pass hooks, walls with openings, pillars and pipes.
+
+    The rope has 25 to 70 links and starts straight, across one end of a hall that is as wide in
+    proportion; the goal is at the other end, with the grippers about half as far apart. Nothing
+    assures that there is a way.
+
+    Parameters
+    ----------
+    random_state : int, Generator, RandomState, SeedSequence or None
+
+    Returns
+    -------
+    scene : Scene
+    """
+    rng = as_generator(random_state)
+    for _ in range(_MOST_DRAWS):
+        try:
+            return _draw_scene(rng)
+        except ValueError:  # the start or the goal is in an obstacle
+            continue
+    raise RuntimeError("No scene has its start and goal clear of obstacles.")
+
+
+def _draw_scene(rng: np.random.Generator) -> Scene:
+    links = int(rng.integers(LEAST_LINKS, MOST_LINKS + 1))
+    length = (links - 1) * NODE_SPACING
+    half_width = 0.5 * length + 0.08
+    hall = (-half_width, half_width)
+    obstacles: list[Obstacle] = [
+        _box((-_HALF_LENGTH, _HALF_LENGTH), hall, (-_HEIGHT - 0.1, -_HEIGHT), "floor")
+    ]
+    wall_x = float(rng.uniform(-0.6, 0.6))
+    has_wall = rng.random() < 0.7
+    if has_wall:
+        obstacles += _wall(rng, wall_x, half_width)
+    for i in range(int(rng.integers(1, 5))):
+        draw = _HOOKS[rng.integers(len(_HOOKS))]
+        obstacles += draw(rng, wall_x if has_wall else None, half_width, f"{i + 1}")
+    if rng.random() < 0.25:
+        obstacles += _slotted_wall(rng, half_width)
+    return Scene(
+        obstacles=obstacles,
+        bounds=np.array([[-_HALF_LENGTH, hall[0], -_HEIGHT], [_HALF_LENGTH, hall[1], _HEIGHT]]),
+        rope_length=length,
+        start=np.array([[-1.1, 0.5 * length, 0.0], [-1.1, -0.5 * length, 0.0]]),
+        goal=np.array([[1.1, 0.26 * length, 0.0], [1.1, -0.24 * length, 0.0]]),
+        name="random scene",
+    )
+
+
+def _wall(rng: np.random.Generator, x: float, half_width: float) -> list[Obstacle]:
+    """A wall across the hall with a slit, either lying or standing."""
+    thick = (x, x + WALL_THICKNESS)
+    opening = float(rng.uniform(0.09, 0.2))
+    if rng.random() < 0.7:
+        z, hall = float(rng.uniform(-0.2, 0.2)), (-half_width, half_width)
+        return [
+            _box(thick, hall, (-_HEIGHT, z - 0.5 * opening), "lower wall"),
+            _box(thick, hall, (z + 0.5 * opening, _HEIGHT), "upper wall"),
+        ]
+    y, tall = float(rng.uniform(-0.5, 0.5)) * half_width, (-_HEIGHT, _HEIGHT)
+    return [
+        _box(thick, (-half_width, y - 0.5 * opening), tall, "right wall"),
+        _box(thick, (y + 0.5 * opening, half_width), tall, "left wall"),
+    ]
+
+
+def _slotted_wall(rng: np.random.Generator, half_width: float) -> list[Obstacle]:
+    """A wall along the hall that only the rope can pass through: it parts the grippers."""
+    y, slot = float(rng.uniform(-0.5, 0.5)) * half_width, 0.05
+    along, thick = (-_HALF_LENGTH, float(rng.uniform(0.0, 0.8))), (y, y + WALL_THICKNESS)
+    return [
+        _box(along, thick, (-_HEIGHT, -0.5 * slot), "lower slotted wall"),
+        _box(along, thick, (0.5 * slot, _HEIGHT), "upper slotted wall"),
+    ]
+
+
+def _bar(
+    rng: np.random.Generator, wall_x: float | None, half_width: float, name: str
+) -> list[Obstacle]:
+    """A bar along the hall that points at the start, from the wall or from nowhere."""
+    end = wall_x if wall_x is not None and rng.random() < 0.7 else float(rng.uniform(-0.5, 0.7))
+    start = max(-0.85, end - float(rng.uniform(0.06, 0.9)))
+    thick = float(rng.uniform(0.03, 0.07))
+    y, z = float(rng.uniform(-0.6, 0.6)) * half_width, float(rng.uniform(-0.25, 0.2))
+    return [_box((start, end), (y, y + thick), (z, z + thick), f"bar {name}")]
+
+
+def _cross_bar(
+    rng: np.random.Generator, wall_x: float | None, half_width: float, name: str
+) -> list[Obstacle]:
+    """A bar from a side wall into the hall, maybe with its end turned up or down."""
+    side = float(rng.choice([-1.0, 1.0]))
+    reach, thick = float(rng.uniform(0.2, 1.2)) * half_width, float(rng.uniform(0.03, 0.07))
+    x, z = float(rng.uniform(-0.75, 0.7)), float(rng.uniform(-0.25, 0.2))
+    ends = sorted((side * half_width, side * (half_width - reach)))
+    bar = _box((x, x + thick), (ends[0], ends[1]), (z, z + thick), f"cross bar {name}")
+    if rng.random() < 0.5:
+        return [bar]
+    tip, turn = side * (half_width - reach), float(rng.uniform(-0.15, 0.15))
+    tips, rises = sorted((tip, tip + side * thick)), sorted((z + thick, z + turn))
+    turned = _box((x, x + thick), (tips[0], tips[1]), (rises[0], rises[1]), f"tip {name}")
+    return [bar, turned]
+
+
+def _pipe(
+    rng: np.random.Generator, wall_x: float | None, half_width: float, name: str
+) -> list[Obstacle]:
+    """A standing cylinder with a pipe that sticks out of it."""
+    x, y = float(rng.uniform(-0.5, 0.6)), float(rng.uniform(-0.5, 0.5)) * half_width
+    radius, top = float(rng.uniform(0.03, 0.12)), float(rng.uniform(-0.1, 0.3))
+    half_height = 0.5 * (top + _HEIGHT)
+    stand = Cylinder((x, y, top - half_height), radius, half_height, 2, f"stand {name}")
+    angle, reach = float(rng.uniform(0.0, 2.0 * np.pi)), radius + float(rng.uniform(0.05, 0.3))
+    z, pipe_radius = float(rng.uniform(-0.2, top)), float(rng.uniform(0.015, 0.05))
+    end = (x + reach * np.cos(angle), y + reach * np.sin(angle), z)
+    return [stand, Capsule((x, y, z), end, pipe_radius, f"pipe {name}")]
+
+
+def _pillar(
+    rng: np.random.Generator, wall_x: float | None, half_width: float, name: str
+) -> list[Obstacle]:
+    """A pillar from floor to ceiling."""
+    x, y = float(rng.uniform(-0.95, 0.7)), float(rng.uniform(-0.6, 0.6)) * half_width
+    thick = float(rng.uniform(0.05, 0.12))
+    return [_box((x, x + thick), (y, y + thick), (-_HEIGHT, _HEIGHT), f"pillar {name}")]
+
+
+def _box(x: Range, y: Range, z: Range, name: str) -> Box:
+    low, high = np.array([x, y, z]).T
+    return Box(tuple(0.5 * (low + high)), tuple(0.5 * (high - low)), name)  # type: ignore[arg-type]
+
+
+_Draw = Callable[[np.random.Generator, float | None, float, str], list[Obstacle]]
+_HOOKS: tuple[_Draw, ...] = (_bar, _bar, _cross_bar, _cross_bar, _pipe, _pillar)
