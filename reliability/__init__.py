@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from reliability.classifier import TransitionReliabilityClassifier
     from reliability.collect import collect_transitions
     from reliability.persistence import ModelFileError, load_estimator
+    from reliability.summary import Summary
 
 __version__ = "0.1.0"
 
@@ -19,6 +20,7 @@ __all__ = [
     "RELIABLE",
     "UNRELIABLE",
     "ModelFileError",
+    "Summary",
     "TransitionReliabilityClassifier",
     "Transitions",
     "collect_transitions",
@@ -31,6 +33,7 @@ _HOMES = {
     "collect_transitions": "reliability.collect",
     "ModelFileError": "reliability.persistence",
     "load_estimator": "reliability.persistence",
+    "Summary": "reliability.summary",
 }
 
 

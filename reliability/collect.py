@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from reliability.labels import UNRELIABLE, label_transitions
+from reliability.labels import label_transitions
+from reliability.summary import Summary
 from reliability.transitions import Transitions
 from systems.errors import SimulationDivergedError
 from systems.system import System
@@ -74,7 +75,8 @@ def collect_transitions(
         Folder to write to as plans are executed. A folder that an earlier, interrupted call with
         the same arguments wrote is completed.
     verbose : int, default=0
-        1 shows a progress bar and a summary.
+        1 shows a progress bar and prints a :class:`reliability.summary.Summary`, which can also
+        be drawn.
 
     Returns
     -------
@@ -189,9 +191,8 @@ def _joined(shards: list[_Shard], n_plans: int, verbose: int) -> Transitions:
     transitions = Transitions.concatenate(parts)
     if verbose:
         print(
-            f"{len(transitions):,} transitions of {n_plans:,} plans, "
-            f"{np.mean(transitions.y == UNRELIABLE):.1%} Unreliable; "
-            f"{n_unsolved} plans unsolved, {n_diverged} diverged."
+            f"{Summary.of(transitions)}\n"
+            f"{n_unsolved} of {n_plans:,} plans were not solved, {n_diverged} diverged."
         )
     return transitions
 

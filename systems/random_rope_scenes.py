@@ -71,7 +71,7 @@ def _draw_scene(rng: np.random.Generator) -> Scene:
 
 
 def _wall(rng: np.random.Generator, x: float, half_width: float) -> list[Obstacle]:
-    """A wall across the hall with a slit, either lying or standing."""
+    """Draw a wall across the hall with a slit, either lying or standing."""
     thick = (x, x + WALL_THICKNESS)
     opening = float(rng.uniform(0.09, 0.2))
     if rng.random() < 0.7:
@@ -88,7 +88,7 @@ def _wall(rng: np.random.Generator, x: float, half_width: float) -> list[Obstacl
 
 
 def _slotted_wall(rng: np.random.Generator, half_width: float) -> list[Obstacle]:
-    """A wall along the hall that only the rope can pass through: it parts the grippers."""
+    """Draw a wall along the hall that only the rope can pass through: it parts the grippers."""
     y, slot = float(rng.uniform(-0.5, 0.5)) * half_width, 0.05
     along, thick = (-_HALF_LENGTH, float(rng.uniform(0.0, 0.8))), (y, y + WALL_THICKNESS)
     return [
@@ -100,7 +100,7 @@ def _slotted_wall(rng: np.random.Generator, half_width: float) -> list[Obstacle]
 def _bar(
     rng: np.random.Generator, wall_x: float | None, half_width: float, name: str
 ) -> list[Obstacle]:
-    """A bar along the hall that points at the start, from the wall or from nowhere."""
+    """Draw a bar along the hall that points at the start, from the wall or from nowhere."""
     end = wall_x if wall_x is not None and rng.random() < 0.7 else float(rng.uniform(-0.5, 0.7))
     start = max(-0.85, end - float(rng.uniform(0.06, 0.9)))
     thick = float(rng.uniform(0.03, 0.07))
@@ -111,7 +111,7 @@ def _bar(
 def _cross_bar(
     rng: np.random.Generator, wall_x: float | None, half_width: float, name: str
 ) -> list[Obstacle]:
-    """A bar from a side wall into the hall, maybe with its end turned up or down."""
+    """Draw a bar from a side wall into the hall, maybe with its end turned up or down."""
     side = float(rng.choice([-1.0, 1.0]))
     reach, thick = float(rng.uniform(0.2, 1.2)) * half_width, float(rng.uniform(0.03, 0.07))
     x, z = float(rng.uniform(-0.75, 0.7)), float(rng.uniform(-0.25, 0.2))
@@ -128,7 +128,7 @@ def _cross_bar(
 def _pipe(
     rng: np.random.Generator, wall_x: float | None, half_width: float, name: str
 ) -> list[Obstacle]:
-    """A standing cylinder with a pipe that sticks out of it."""
+    """Draw a standing cylinder with a pipe that sticks out of it."""
     x, y = float(rng.uniform(-0.5, 0.6)), float(rng.uniform(-0.5, 0.5)) * half_width
     radius, top = float(rng.uniform(0.03, 0.12)), float(rng.uniform(-0.1, 0.3))
     half_height = 0.5 * (top + _HEIGHT)
@@ -142,7 +142,7 @@ def _pipe(
 def _pillar(
     rng: np.random.Generator, wall_x: float | None, half_width: float, name: str
 ) -> list[Obstacle]:
-    """A pillar from floor to ceiling."""
+    """Draw a pillar from floor to ceiling."""
     x, y = float(rng.uniform(-0.95, 0.7)), float(rng.uniform(-0.6, 0.6)) * half_width
     thick = float(rng.uniform(0.05, 0.12))
     return [_box((x, x + thick), (y, y + thick), (-_HEIGHT, _HEIGHT), f"pillar {name}")]
@@ -150,7 +150,7 @@ def _pillar(
 
 def _box(x: Range, y: Range, z: Range, name: str) -> Box:
     low, high = np.array([x, y, z]).T
-    return Box(tuple(0.5 * (low + high)), tuple(0.5 * (high - low)), name)  # type: ignore[arg-type]
+    return Box(tuple(0.5 * (low + high)), tuple(0.5 * (high - low)), name)
 
 
 _Draw = Callable[[np.random.Generator, float | None, float, str], list[Obstacle]]

@@ -113,7 +113,7 @@ def test_progress_and_summary_on_request(capsys):
     output = capsys.readouterr()
     assert "1/1" in output.err
     assert "transitions of 5 plans" in output.out
-    assert "0 plans unsolved" in output.out
+    assert "0 of 5 plans were not solved" in output.out
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         collect(Disc(), 5)

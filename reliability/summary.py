@@ -1,0 +1,113 @@
+"""What a collection holds, in a few numbers and two plots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reliability.labels import UNRELIABLE
+from reliability.transitions import Transitions
+
+
+@dataclass(frozen=True, eq=False)
+class Summary:
+    """The balance and the size of labelled transitions.
+
+    Attributes
+    ----------
+    n_transitions : int
+    n_plans : int
+        Plans that gave a transition.
+    unreliable_share : float
+        Of all transitions.
+    first_mistake_share : float
+        Share of the Unreliable transitions where prediction and execution part; in the others
+        they had parted before. NaN without any Unreliable one.
+    faultless_share : float
+        Plans all of whose transitions are Reliable.
+    transitions_per_plan : ndarray of int of shape (n_plans,)
+    reliable_before_mistake : ndarray of int
+        Transitions that went well before the first mistake, of each plan that has one.
+    """
+
+    n_transitions: int
+    n_plans: int
+    unreliable_share: float
+    first_mistake_share: float
+    faultless_share: float
+    transitions_per_plan: NDArray[np.int64]
+    reliable_before_mistake: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, transitions: Transitions) -> Summary:
+        """Summarize transitions.
+
+        Parameters
+        ----------
+        transitions : Transitions
+            At least one.
+        """
+        unreliable = transitions.y == UNRELIABLE
+        plans, number, sizes = np.unique(transitions.plan, return_inverse=True, return_counts=True)
+        first = np.full(len(plans), np.iinfo(np.int64).max)
+        np.minimum.at(first, number[unreliable], transitions.step[unreliable])
+        spoilt = np.isin(np.arange(len(plans)), number[unreliable])
+        n_unreliable = int(unreliable.sum())
+        n_first = int(transitions.first_mistakes().sum())
+        return cls(
+            n_transitions=len(transitions),
+            n_plans=len(plans),
+            unreliable_share=float(unreliable.mean()),
+            first_mistake_share=n_first / n_unreliable if n_unreliable else float("nan"),
+            faultless_share=float(1 - spoilt.mean()),
+            transitions_per_plan=sizes,
+            reliable_before_mistake=first[spoilt],
+        )
+
+    def __str__(self) -> str:
+        """Tell the numbers in a few lines."""
+        low, middle, high = np.quantile(self.transitions_per_plan, (0.1, 0.5, 0.9))
+        of_those = (
+            f"; {self.first_mistake_share:.1%} of those are first mistakes, the others follow one"
+            if self.unreliable_share
+            else ""
+        )
+        return (
+            f"{self.n_transitions:,} transitions of {self.n_plans:,} plans: "
+            f"{self.transitions_per_plan.mean():.1f} a plan, {middle:.0f} in the median, "
+            f"{low:.0f} to {high:.0f} in four fifths.\n"
+            f"{self.unreliable_share:.1%} are Unreliable{of_those}.\n"
+            f"{self.faultless_share:.1%} of the plans are Reliable from start to end."
+        )
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw how long plans are, and how far they go well.
+
+        Parameters
+        ----------
+        axes : sequence of two matplotlib Axes, default=None
+            None makes a figure.
+
+        Returns
+        -------
+        axes : sequence of two matplotlib Axes
+        """
+        if axes is None:
+            import matplotlib.pyplot as plt
+
+            _, axes = plt.subplots(1, 2, figsize=(9, 3), layout="constrained", sharey=True)
+        most = int(self.transitions_per_plan.max())
+        bins = np.linspace(0, most, min(most, 40) + 1)
+        axes[0].hist(self.transitions_per_plan, bins, color="tab:blue")
+        axes[0].set(xlabel="transitions per plan", ylabel="plans")
+        axes[1].hist(self.reliable_before_mistake, bins, color="tab:red")
+        axes[1].set(xlabel="Reliable transitions before the first mistake")
+        axes[1].set_title(
+            f"{1 - self.faultless_share:.0%} of plans have one; "
+            f"{self.unreliable_share:.0%} of transitions are Unreliable",
+            fontsize="medium",
+        )
+        return axes
