@@ -96,9 +96,7 @@ def row_types(estimator: Any) -> Any:
     return [np.float32, np.uint8] if estimator.backend == "voxnet" else np.float32
 
 
-def accuracy(
-    estimator: Any, X: NDArray[Any], truth: NDArray[Any], rows: NDArray[np.intp]
-) -> float:
+def accuracy(estimator: Any, X: NDArray[Any], truth: NDArray[Any], rows: NDArray[np.intp]) -> float:
     """Return the share of rows that are predicted right, taking some at a time; NaN for none."""
     if len(rows) == 0:
         return float("nan")

@@ -56,14 +56,16 @@ class Checkpoint(Callback):
         self.stop = stop
 
     def on_train_begin(self, net: NeuralNet, **kwargs: Any) -> None:
+        """Go on from the file, if there is one."""
         if self.path.exists():
             self._restore(net, self._read(net.max_epochs))
 
     def on_epoch_end(self, net: NeuralNet, **kwargs: Any) -> None:
+        """Write the file."""
         self._write(net)
 
     def on_train_end(self, net: NeuralNet, **kwargs: Any) -> None:
-        # Stopping early skips the callbacks behind it.
+        """Write the file of a training that stopped early, which skips the callbacks behind."""
         if self._has_stopped():
             self._write(net)
 

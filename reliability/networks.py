@@ -19,6 +19,7 @@ from torch.utils.data import Dataset
 from tqdm.auto import tqdm
 
 from reliability.checkpoint import Checkpoint, digest
+from reliability.voxnet import VoxNet
 
 ROWS_PER_FORWARD = 8192
 State = dict[str, NDArray[np.float32]]
@@ -95,9 +96,7 @@ class TrainingPlan:
     provenance: dict[str, Any]
 
 
-PLAN_PARAMETERS = tuple(
-    field.name for field in fields(TrainingPlan) if field.name != "provenance"
-)
+PLAN_PARAMETERS = tuple(field.name for field in fields(TrainingPlan) if field.name != "provenance")
 # What may differ between a training and its continuation.
 _FREE_PARAMETERS = {"max_epochs", "checkpoint", "verbose", "random_state"}
 
@@ -192,7 +191,7 @@ class _Watch(Callback):
         self.correct_[training] += int((answers == truth).sum())
         self.rows_[training] += len(truth)
         if training:
-            self.loss_ += float(kwargs["loss"]) * len(truth)
+            self.loss_ += kwargs["loss"].item() * len(truth)
             self._show(True, loss=self.loss_ / self.rows_[True])
 
     def on_epoch_end(self, net: NeuralNet, **kwargs: Any) -> None:
@@ -333,7 +332,8 @@ def restore(
     """Build a trained module for inference from its state, on the CPU if the device is not here."""
     restored = module(**module_parameters)
     restored.load_state_dict({name: torch.from_numpy(array) for name, array in state.items()})
-    restored = restored.for_inference() if hasattr(restored, "for_inference") else restored
+    if isinstance(restored, VoxNet):
+        restored.for_inference()
     here = device if torch.cuda.is_available() or not device.startswith("cuda") else "cpu"
     return restored.eval().to(here)
 

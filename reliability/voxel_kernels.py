@@ -34,12 +34,12 @@ def fill_grids(
                 for y in range(side):
                     cells = grids[n, x // pooling, y // pooling]
                     for byte in range(column):
-                        bits = np.int64(rows[n, at])
+                        cube = np.int64(rows[n, at])
                         at += 1
-                        if bits == 0:
+                        if cube == 0:
                             continue
                         for k in range(8 // pooling):
-                            part = (bits >> (shift - k * pooling)) & mask
+                            part = (cube >> (shift - k * pooling)) & mask
                             z = byte * (8 // pooling) + k
                             if channel == 0:
                                 cells[z, 0] += share[part]

@@ -61,7 +61,8 @@ class VoxNet(nn.Module):
             nn.Linear(32 * (((seen - 5) // 2 - 1) // 2) ** 3, 128),
             nn.ReLU(),
             nn.Dropout(0.4),
-        ).to(memory_format=torch.channels_last_3d)
+        )
+        self.layers.to(memory_format=torch.channels_last_3d)  # type: ignore[call-overload]
         self.head = nn.Linear(128, 1)
 
     def forward(self, rows: Tensor) -> Tensor:
@@ -69,18 +70,17 @@ class VoxNet(nn.Module):
         if self.training and self.augment:
             draws = torch.randint(N_SYMMETRIES, (len(rows),)).to(rows.device)
             rows = transformed(rows, self.channels, self.side, draws)
-        weight = self.layers[0].weight
-        grids = self.grids(rows).to(weight.dtype)
-        automatic = self.mixed_precision and weight.dtype == torch.float32
+        dtype = next(self.layers.parameters()).dtype
+        grids = self.grids(rows).to(dtype)
+        automatic = self.mixed_precision and dtype == torch.float32
         with torch.autocast(rows.device.type, torch.bfloat16, enabled=automatic):
             hidden = self.layers(grids)
         return self.head(hidden.float())
 
-    def for_inference(self) -> VoxNet:
+    def for_inference(self) -> None:
         """Round the weights once instead of at each call; the logits stay the same."""
         if self.mixed_precision:
             self.layers.to(torch.bfloat16)
-        return self
 
     def grids(self, rows: Tensor) -> Tensor:
         """Return what the first layer sees of rows, float32 of shape (n, channels, x, y, z)."""

@@ -2,20 +2,13 @@
 
 import itertools
 
-import joblib
 import numpy as np
 import pytest
-import torch
-from sklearn.base import clone
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import FunctionTransformer
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from planners.check_transition import CheckTransition
 from reliability import TransitionReliabilityClassifier
 from reliability.persistence import ModelFileError
-from reliability.voxnet import VoxNet, transformed, unpacked, unpacked_on_device
-from systems import Rope
+from reliability.voxnet import VoxNet
 
 QUICK = {"max_epochs": 6, "batch_size": 16, "learning_rate": 3e-3, "random_state": 0}
 
@@ -77,7 +70,7 @@ def test_it_learns_whether_a_band_is_near_an_obstacle(data, fitted):
     assert len(fitted.history_) == 12
 
 
-class Killed(Exception):
+class KilledError(Exception):
     pass
 
 
@@ -87,7 +80,7 @@ def killed_in_epoch(monkeypatch, epoch):
 
     def die(self, rows):
         if next(calls) >= epoch:
-            raise Killed
+            raise KilledError
         return forward(self, rows)
 
     monkeypatch.setattr(VoxNet, "forward", die)
@@ -112,7 +105,7 @@ def test_a_killed_training_goes_on_to_the_same_end(data, tmp_path, monkeypatch, 
     for n_batches in (per_epoch // 2, 2 * per_epoch + 1):
         with monkeypatch.context() as patch:
             killed_in_epoch(patch, n_batches)
-            with pytest.raises(Killed):
+            with pytest.raises(KilledError):
                 kept.fit(X, y)
     assert path.exists()
     assert_same_fit(kept.fit(X, y), whole)
@@ -140,7 +133,7 @@ def test_a_checkpoint_of_another_training_is_refused(data, tmp_path):
     ):
         with pytest.raises(ModelFileError, match=message):
             voxnet(**{"max_epochs": 1, "checkpoint": path} | parameters).fit(X, y)
-    with pytest.raises(ModelFileError, match="data = .* another path"):
+    with pytest.raises(ModelFileError, match=r"data = .* another path"):
         voxnet(max_epochs=1, checkpoint=path).fit(X[::-1], y)
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(ModelFileError, match="is truncated or no checkpoint"):
