@@ -128,14 +128,15 @@ class Transitions:
         -------
         X : ndarray of shape (n, n_features)
         """
-        starts = range(0, max(len(self), 1), _DESCRIBED_AT_ONCE)
-        parts = (self._first[i : i + _DESCRIBED_AT_ONCE] for i in starts)
-        return np.concatenate(
-            [
-                system.features(self._states.unpack(part), self._states.unpack(part + 1))
-                for part in parts
-            ]
-        )
+        # A million grids fit into memory once, not twice: parts are not joined but filled in.
+        X = None
+        for first in range(0, max(len(self), 1), _DESCRIBED_AT_ONCE):
+            part = self._first[first : first + _DESCRIBED_AT_ONCE]
+            rows = system.features(self._states.unpack(part), self._states.unpack(part + 1))
+            if X is None:
+                X = np.empty((len(self), *rows.shape[1:]), dtype=rows.dtype)
+            X[first : first + len(rows)] = rows
+        return X
 
     def first_mistakes(self) -> NDArray[np.bool_]:
         """Tell where execution and prediction part, from where they had already parted.
