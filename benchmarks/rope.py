@@ -57,7 +57,7 @@ def print_voxnet(rope: Rope) -> None:
             "voxnet", pooling=pooling, max_epochs=1, rows_per_epoch=64, random_state=0
         ).fit(rows, labels)
         judge = network.fast_decision_function
-        rates = [rate(lambda n=n: judge(rows[:n]), n) for n in BATCHES]
+        rates = [rate(lambda n=n, judge=judge: judge(rows[:n]), n) for n in BATCHES]
         extended = extensions(rope, network)
         cells = [*(f"{each:,.0f}" for each in rates), f"{grids / rates[-1]:.0f}"]
         shares = [f"{extended / rates[1]:.2f}", f"{extended / alone:.3f}"]

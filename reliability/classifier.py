@@ -119,8 +119,8 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
 
     Notes
     -----
-    With ``mixed_precision`` on the CPU a row's logit is the same in every batch; otherwise it may
-    differ in the last digits between "voxnet" batches of different lengths.
+    With "voxnet" the last digits of a row's logit may depend on the other rows of its batch, as
+    with any tensor library; only a logit of almost zero could change its sign.
 
     A joblib file holds the weights as arrays and no training state, so that it loads on a machine
     without the training device. Like any pickle, load only files that you trust.
@@ -290,7 +290,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         """Return :meth:`decision_function` of rows that are known to be sound.
 
         For planners, which ask for a few transitions at a time and a hundred thousand times:
-        nothing is validated. The sign is the same as that of :meth:`decision_function`.
+        nothing is validated. With "mlp" the sign is always that of :meth:`decision_function`.
 
         Parameters
         ----------
