@@ -1,7 +1,8 @@
-"""The rope's rates on one core: g, Close, RRT extensions, Γ, and the engine's share of Γ.
+"""The rope's rates on one core: g, Close, RRT extensions, Γ, the engine's share of Γ, VoxNet.
 
-Run as ``python benchmarks/rope.py``; it takes about a minute. Rates depend on the machine, so
-each is also given as a multiple of Γ's in the same run. Seconds are of this process alone.
+Run as ``python benchmarks/rope.py``; it takes about two minutes. Rates depend on the machine, so
+each is also given as a multiple of another one of the same run: Γ's, the network's alone, or
+that of planning without a classifier. Seconds are of this process alone.
 """
 
 from __future__ import annotations
@@ -13,11 +14,15 @@ import numpy as np
 from rope_engines import measure
 
 from planners import BiasedRRT
+from reliability import TransitionReliabilityClassifier
 from systems import Rope
 
 SCENES = ("simple_hook_short", "simple_hook", "simple_hook_long", "simple_hook_very_long")
 N_PLANS = 4
 REPETITIONS = 5
+SEARCH_SECONDS = 10.0
+# A planner asks about as many transitions at a time; a data set is judged in larger batches.
+BATCHES = (1, 8, 64)
 
 
 def main() -> None:
@@ -29,6 +34,59 @@ def main() -> None:
         *rates, gamma = all_rates(Rope(scene))
         cells = [f"{rate:,.0f} ({rate / gamma:.1f} Γ)" for rate in rates]
         print(f"| {scene} | {' | '.join(cells)} | {gamma:,.0f} | {share:.2f} |", flush=True)
+    print_voxnet(Rope("simple_hook"))
+
+
+def print_voxnet(rope: Rope) -> None:
+    """Print what voxel grids and networks of 32 and of 16 cells a side cost.
+
+    The networks have seen one epoch of random labels, and k = 0 accepts whatever they say: what
+    they say does not matter to how long they take.
+    """
+    alone = extensions(rope, None)
+    before, after = transitions(rope)
+    grids = rate(lambda: rope.features(before, after), len(before))
+    rows = rope.features(before, after)
+    labels = np.random.default_rng(0).integers(0, 2, len(rows))
+    sizes = " | ".join(f"rows/s, {n} at a time" for n in BATCHES)
+    print(f"\n{grids:,.0f} voxel grids/s, {alone:,.0f} extensions/s without a classifier")
+    print(f"| network | {sizes} | grids/s : rows/s | extensions/s | of rows/s | of without |")
+    print("|" + "---|" * (5 + len(BATCHES)))
+    for pooling in (1, 2):
+        network = TransitionReliabilityClassifier(
+            "voxnet", pooling=pooling, max_epochs=1, rows_per_epoch=64, random_state=0
+        ).fit(rows, labels)
+        judge = network.fast_decision_function
+        rates = [rate(lambda n=n, judge=judge: judge(rows[:n]), n) for n in BATCHES]
+        extended = extensions(rope, network)
+        cells = [*(f"{each:,.0f}" for each in rates), f"{grids / rates[-1]:.0f}"]
+        shares = [f"{extended / rates[1]:.2f}", f"{extended / alone:.3f}"]
+        side = 32 // pooling
+        print(f"| {side}³ | {' | '.join([*cells, f'{extended:,.0f}', *shares])} |", flush=True)
+
+
+def extensions(rope: Rope, estimator: TransitionReliabilityClassifier | None) -> float:
+    """Return transitions that a search checks per second, with or without a classifier."""
+    problem = rope.scene_problem()
+    start = rope.reduce(problem.start)
+    n_added, seconds, seed = 0, 0.0, 0
+    while seconds < SEARCH_SECONDS:
+        planner = BiasedRRT(
+            rope, estimator, k=0, accuracy=1.0, simplify=False, time_limit=5.0, random_state=seed
+        )
+        began = time.process_time()
+        n_added += len(planner.plan(start, problem.goal).tree)
+        seconds += time.process_time() - began
+        seed += 1
+    return n_added / seconds
+
+
+def transitions(rope: Rope) -> tuple[np.ndarray, np.ndarray]:
+    """Return b and b' along a plan."""
+    problem = rope.scene_problem()
+    planner = BiasedRRT(rope, simplify=False, random_state=0)
+    path = planner.plan(rope.reduce(problem.start), problem.goal).reduced
+    return path[:-1], path[1:]
 
 
 def all_rates(rope: Rope) -> tuple[float, float, float, float]:

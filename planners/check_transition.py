@@ -75,7 +75,9 @@ class CheckTransition:
     @property
     def answers_fast(self) -> bool:
         """Whether single transitions cost about as little as those of a large batch."""
-        return self._estimator is None or self._fast is not None
+        if self._estimator is None:
+            return True
+        return self._fast is not None and not getattr(self._estimator, "prefers_batches", False)
 
     def __call__(self, reduced: Array, next_reduced: Array) -> NDArray[np.bool_]:
         """Accept or reject transitions that g found valid, drawing anew at each call.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from importlib.metadata import version
 from typing import Any
@@ -12,10 +13,18 @@ from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from reliability.backends import (
+    accuracy,
+    check_packed,
+    check_parameters,
+    check_pooling,
+    resolved,
+    row_types,
+)
 from reliability.mlp_kernel import mlp_logits
 from reliability.persistence import ModelFileError
 from reliability.training_set import encode_labels, hold_out, weigh_rows
-from systems.validation import RandomState, as_generator, check_count, check_number
+from systems.validation import RandomState, as_generator
 
 FORMAT_VERSION = 1
 LEAKY_SLOPE = np.float32(0.01)
@@ -31,6 +40,10 @@ def _is_mlp(estimator: TransitionReliabilityClassifier) -> bool:
     return estimator.backend == "mlp"
 
 
+def _answers_unchecked(estimator: TransitionReliabilityClassifier) -> bool:
+    return estimator.backend in ("mlp", "voxnet")
+
+
 class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
     """Predict whether a transition of the reduced model is reliable.
 
@@ -38,31 +51,56 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
 
     Parameters
     ----------
-    backend : {"mlp"} or type, default="mlp"
-        "mlp" is the paper's network for the arm: LeakyReLU layers and one logit. A class of torch
-        modules of your own is called with the number of features, and must map float32 rows to
-        one logit each; it must be importable for the fitted classifier to be saved.
+    backend : {"mlp", "voxnet"} or type, default="mlp"
+        "mlp" is the paper's network for the arm: LeakyReLU layers and one logit. "voxnet" is its
+        network for the rope: two three-dimensional convolutions and two full layers over rows of
+        uint8, which are voxel grids packed by ``np.packbits`` (channels of 16, 32 or 64 cells
+        cubed, in the order channel, x, y, z); floats of any number fill a grid of their own. A
+        class of torch modules of your own is called with the number of features, and must map
+        float32 rows to one logit each; it must be importable for the fitted classifier to be
+        saved.
     hidden_layer_sizes : tuple of int, default=(256, 128, 64)
         Units of the "mlp" backend.
-    max_epochs : int, default=25
-    batch_size : int, default=256
-    learning_rate : float, default=2e-3
-        Initial learning rate of Adam.
-    learning_rate_decay : float, default=0.87
-        Factor by which the learning rate is multiplied every ``epochs_per_decay`` epochs.
-    epochs_per_decay : int, default=1
-    validation_fraction : float, default=0.2
+    max_epochs : int, default=None
+        This and the other defaults of None are the backend's own: 25, or 100 for "voxnet".
+    batch_size : int, default=None
+        256, or 32 for "voxnet".
+    learning_rate : float, default=None
+        Initial learning rate of Adam: 2e-3, or 5e-4 for "voxnet".
+    learning_rate_decay : float, default=None
+        Factor by which the learning rate is multiplied every ``epochs_per_decay`` epochs: 0.87,
+        or 0.8 for "voxnet".
+    epochs_per_decay : int, default=None
+        1, or 4 for "voxnet".
+    rows_per_epoch : int, default=None
+        Rows that an epoch draws. None takes as many as there are. Where it is given, the
+        held-out loss of an epoch is that of as many rows at most.
+    validation_fraction : float, default=None
         Share of the data that is held out: whole groups if ``fit`` is given groups, single rows
-        if not.
+        if not. 0.2, or 0.1 for "voxnet".
     patience : int, default=None
         Stop when the held-out loss has not improved for so many epochs, and keep the best epoch's
         weights. None trains for ``max_epochs``.
     class_weight : dict, "balanced" or None, default=None
         Weights of the classes in the loss, as in scikit-learn.
-    balanced_batches : bool, default=False
-        Draw training batches with replacement so that both classes are equally likely.
+    balanced_batches : bool, default=None
+        Draw training batches with replacement so that both classes are equally likely: False, or
+        True for "voxnet".
+    pooling : {1, 2, 4}, default=1
+        "voxnet" sees cubes of so many cells a side as one: the mean of the first channel, which
+        is the surroundings, and the maximum of the others. 2 makes it ten times as fast.
+    mixed_precision : bool, default=True
+        "voxnet" computes in bfloat16, all but its last layer.
+    augment : bool, default=False
+        "voxnet" learns each packed grid turned about z by a multiple of 90 degrees and mirrored
+        at random.
     device : str, default="cpu"
-        Torch device to train and predict on.
+        Torch device to train and predict on. A model whose device is not here predicts on the
+        CPU.
+    checkpoint : path-like, default=None
+        File in which the training is kept after each epoch. A fit that was killed goes on from
+        it when it is called again with the same data and parameters, ``random_state`` among
+        them, and ends with the same weights; ``max_epochs`` may have grown.
     random_state : int, Generator, RandomState or None, default=None
         Reproduces the split and the training; global generators are left alone.
     verbose : int, default=0
@@ -81,6 +119,9 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
 
     Notes
     -----
+    With "voxnet" the last digits of a row's logit may depend on the other rows of its batch, as
+    with any tensor library; only a logit of almost zero could change its sign.
+
     A joblib file holds the weights as arrays and no training state, so that it loads on a machine
     without the training device. Like any pickle, load only files that you trust.
 
@@ -104,16 +145,21 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         backend: str | type = "mlp",
         *,
         hidden_layer_sizes: tuple[int, ...] = (256, 128, 64),
-        max_epochs: int = 25,
-        batch_size: int = 256,
-        learning_rate: float = 2e-3,
-        learning_rate_decay: float = 0.87,
-        epochs_per_decay: int = 1,
-        validation_fraction: float = 0.2,
+        max_epochs: int | None = None,
+        batch_size: int | None = None,
+        learning_rate: float | None = None,
+        learning_rate_decay: float | None = None,
+        epochs_per_decay: int | None = None,
+        rows_per_epoch: int | None = None,
+        validation_fraction: float | None = None,
         patience: int | None = None,
         class_weight: dict[Any, float] | str | None = None,
-        balanced_batches: bool = False,
+        balanced_batches: bool | None = None,
+        pooling: int = 1,
+        mixed_precision: bool = True,
+        augment: bool = False,
         device: str = "cpu",
+        checkpoint: str | os.PathLike[str] | None = None,
         random_state: RandomState = None,
         verbose: int = 0,
     ) -> None:
@@ -124,11 +170,16 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         self.learning_rate = learning_rate
         self.learning_rate_decay = learning_rate_decay
         self.epochs_per_decay = epochs_per_decay
+        self.rows_per_epoch = rows_per_epoch
         self.validation_fraction = validation_fraction
         self.patience = patience
         self.class_weight = class_weight
         self.balanced_batches = balanced_batches
+        self.pooling = pooling
+        self.mixed_precision = mixed_precision
+        self.augment = augment
         self.device = device
+        self.checkpoint = checkpoint
         self.random_state = random_state
         self.verbose = verbose
 
@@ -164,15 +215,21 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         ------
         ValueError
             If a parameter or the data are unfit.
+            Or if ``checkpoint`` is a file of another training.
         FloatingPointError
             If training diverges.
         """
-        self._check_parameters()
-        rows, labels = validate_data(self, X, y, dtype=np.float32)
+        parameters = resolved(self)
+        check_parameters(parameters)
+        rows, labels = validate_data(self, X, y, dtype=row_types(self))
+        self._packed = rows.dtype == np.uint8
+        if self._packed:
+            check_pooling(self.n_features_in_, self.pooling)
         self.classes_, target = encode_labels(labels)
         weight = weigh_rows(labels, self.classes_, self.class_weight, sample_weight)
         rng = as_generator(self.random_state)
-        training, held_out = hold_out(len(rows), groups, self.validation_fraction, rng)
+        fraction = parameters["validation_fraction"]
+        training, held_out = hold_out(len(rows), groups, fraction, rng)
         used = training[weight[training] > 0]
         if len(used) == 0:
             raise ValueError("sample_weight must be positive for some training row, got zeros.")
@@ -181,7 +238,8 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         self._forget_module()
         self._constant = _constant_logit(target[used], len(self.classes_))
         if self._constant is None:
-            self._train(rows, target, weight, used, held_out, int(rng.integers(2**31)))
+            data = (rows, target, weight)
+            self._train(parameters, data, used, held_out, int(rng.integers(2**31)))
         else:
             warnings.warn(
                 "The training rows are all of one class, which will always be predicted.",
@@ -189,10 +247,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
             )
         self._format_version = FORMAT_VERSION
         self._package_versions = {name: version(name) for name in STAMPED_PACKAGES}
-        truth = self.classes_[target[held_out]]
-        self.validation_accuracy_ = (
-            float(np.mean(self.predict(rows[held_out]) == truth)) if len(held_out) else float("nan")
-        )
+        self.validation_accuracy_ = accuracy(self, rows, self.classes_[target], held_out)
         return self
 
     def decision_function(self, X: ArrayLike) -> NDArray[np.float32]:
@@ -208,7 +263,10 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
             Positive where ``classes_[1]`` is predicted.
         """
         check_is_fitted(self)
-        rows: NDArray[np.float32] = validate_data(self, X, dtype=np.float32, reset=False)
+        if self._packed:
+            check_packed(X, self.n_features_in_)
+        types = np.uint8 if self._packed else np.float32
+        rows: NDArray[Any] = validate_data(self, X, dtype=types, reset=False)
         if self._constant is not None:
             return np.full(len(rows), self._constant, dtype=np.float32)
         if not _is_mlp(self):
@@ -222,20 +280,28 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         decision[doubtful] = self._kernel_logits(rows[doubtful])
         return decision
 
-    @available_if(_is_mlp)
-    def fast_decision_function(self, X: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+    @property
+    def prefers_batches(self) -> bool:
+        """Whether a row costs much less in a batch than alone."""
+        return not _is_mlp(self)
+
+    @available_if(_answers_unchecked)
+    def fast_decision_function(self, X: NDArray[Any]) -> NDArray[np.float32]:
         """Return :meth:`decision_function` of rows that are known to be sound.
 
         For planners, which ask for a few transitions at a time and a hundred thousand times:
-        nothing is validated. The sign is the same as that of :meth:`decision_function`.
+        nothing is validated. With "mlp" the sign is always that of :meth:`decision_function`.
 
         Parameters
         ----------
-        X : ndarray of float of shape (n, n_features)
+        X : ndarray of shape (n, n_features)
+            Floats, or uint8 where the classifier was fitted on it.
         """
         if self._constant is not None:
             return np.full(len(X), self._constant, dtype=np.float32)
-        return self._kernel_logits(X)
+        if _is_mlp(self):
+            return self._kernel_logits(X)
+        return self._torch_logits(X if self._packed else np.asarray(X, dtype=np.float32))
 
     def predict_proba(self, X: ArrayLike) -> NDArray[np.float64]:
         """Return the probability of each class for each row of X.
@@ -289,55 +355,50 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
 
     def _train(
         self,
-        X: NDArray[np.float32],
-        target: NDArray[np.intp],
-        weight: NDArray[np.float64],
+        parameters: dict[str, Any],
+        data: tuple[NDArray[Any], NDArray[np.intp], NDArray[np.float64]],
         training: NDArray[np.intp],
         held_out: NDArray[np.intp],
         seed: int,
     ) -> None:
         from reliability import networks
 
-        def data(rows: NDArray[np.intp]) -> networks.TrainingData:
-            return networks.TrainingData(
-                X[rows], target[rows].astype(np.float32), weight[rows].astype(np.float32)
-            )
-
-        plan = networks.TrainingPlan(
-            max_epochs=self.max_epochs,
-            batch_size=self.batch_size,
-            learning_rate=self.learning_rate,
-            learning_rate_decay=self.learning_rate_decay,
-            epochs_per_decay=self.epochs_per_decay,
-            patience=self.patience if len(held_out) else None,
-            balanced_batches=self.balanced_batches,
-            device=self.device,
-            verbose=self.verbose,
-        )
+        kept = {name: parameters[name] for name in networks.PLAN_PARAMETERS}
+        kept["patience"] = self.patience if len(held_out) else None
+        provenance = {}
+        if self.checkpoint is not None:
+            provenance = networks.provenance(parameters, data, training, held_out, seed)
+        judged = held_out[:: -(-len(held_out) // (self.rows_per_epoch or len(held_out) or 1)) or 1]
         self._state, self.history_ = networks.train(
             *self._architecture(),
-            data(training),
-            data(held_out) if len(held_out) else None,
-            plan,
+            networks.TrainingData(*data, training),
+            networks.TrainingData(*data, judged) if len(judged) else None,
+            networks.TrainingPlan(**kept, provenance=provenance),
             seed,
         )
 
     def _architecture(self) -> tuple[Any, dict[str, Any]]:
-        from reliability import networks
-
+        size = {"n_features": self.n_features_in_}
         if _is_mlp(self):
-            sizes = tuple(self.hidden_layer_sizes)
-            return networks.MLP, {"n_features": self.n_features_in_, "hidden_layer_sizes": sizes}
-        return self.backend, {"n_features": self.n_features_in_}
+            from reliability.networks import MLP
 
-    def _torch_logits(self, X: NDArray[np.float32]) -> NDArray[np.float32]:
+            return MLP, size | {"hidden_layer_sizes": tuple(self.hidden_layer_sizes)}
+        if self.backend == "voxnet":
+            from reliability.voxnet import VoxNet
+
+            names = ("pooling", "mixed_precision", "augment")
+            own = {name: getattr(self, name) for name in names}
+            return VoxNet, size | {"packed": self._packed} | own
+        return self.backend, size
+
+    def _torch_logits(self, X: NDArray[Any]) -> NDArray[np.float32]:
         from reliability import networks
 
         if not hasattr(self, "_module"):
             module = networks.restore(*self._architecture(), self._state, self.device)
             self._module = module
         with networks.one_thread():
-            return networks.logits(self._module, X, self.device)
+            return networks.logits(self._module, X)
 
     def _kernel_logits(self, X: NDArray[Any]) -> NDArray[np.float32]:
         if not hasattr(self, "_flat"):
@@ -348,26 +409,6 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
     def _forget_module(self) -> None:
         self.__dict__.pop("_module", None)
         self.__dict__.pop("_flat", None)
-
-    def _check_parameters(self) -> None:
-        if self.backend != "mlp" and not isinstance(self.backend, type):
-            raise ValueError(
-                f'backend must be "mlp" or a class of torch modules, got {self.backend!r}.'
-            )
-        if not isinstance(self.hidden_layer_sizes, tuple | list):
-            raise ValueError(
-                "hidden_layer_sizes must be a tuple of positive integers, "
-                f"got {self.hidden_layer_sizes!r}."
-            )
-        for size in self.hidden_layer_sizes:
-            check_count(size, "Each of hidden_layer_sizes")
-        for name in ("max_epochs", "batch_size", "epochs_per_decay"):
-            check_count(getattr(self, name), name)
-        if self.patience is not None:
-            check_count(self.patience, "patience")
-        check_number(self.learning_rate, "learning_rate", 0, np.inf)
-        check_number(self.learning_rate_decay, "learning_rate_decay", 0, 1)
-        check_number(self.validation_fraction, "validation_fraction", 0, 1)
 
 
 def _constant_logit(target: NDArray[np.intp], n_classes: int) -> float | None:

@@ -128,14 +128,17 @@ class Transitions:
         -------
         X : ndarray of shape (n, n_features)
         """
-        starts = range(0, max(len(self), 1), _DESCRIBED_AT_ONCE)
-        parts = (self._first[i : i + _DESCRIBED_AT_ONCE] for i in starts)
-        return np.concatenate(
-            [
-                system.features(self._states.unpack(part), self._states.unpack(part + 1))
-                for part in parts
-            ]
-        )
+        # A million grids fit into memory once, not twice: parts are not joined but filled in.
+        none = self._described(system, slice(0, 0))
+        X = np.empty((len(self), *none.shape[1:]), dtype=none.dtype)
+        for first in range(0, len(self), _DESCRIBED_AT_ONCE):
+            rows = slice(first, first + _DESCRIBED_AT_ONCE)
+            X[rows] = self._described(system, rows)
+        return X
+
+    def _described(self, system: System, rows: slice) -> NDArray[Any]:
+        first = self._first[rows]
+        return system.features(self._states.unpack(first), self._states.unpack(first + 1))
 
     def first_mistakes(self) -> NDArray[np.bool_]:
         """Tell where execution and prediction part, from where they had already parted.

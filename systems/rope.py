@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.band import WORKSPACE_SHAPE, bands_close, reduce_rope, reduced_dim
 from systems.distance import signed_distance
-from systems.rope_features import vector_features
+from systems.rope_features import FEATURES
 from systems.rope_kernels import all_finite, fill_margins, propagate_rope_rows, steer_rows
 from systems.rope_rollout import ENGINES, RopeRollout, rope_length
 from systems.rope_scene import (
@@ -47,11 +47,15 @@ class Rope(System):
         One of the paper's scenes by name (``systems.rope_scenes.SCENE_NAMES``), or your own.
     engine : {"mujoco", "pybullet"}, default="mujoco"
         Simulates the rope in :meth:`rollout`; started when it is first needed.
+    features : {"voxels", "curtain", "vector"}, default="voxels"
+        What :meth:`features` gives: bit-packed voxel grids, for the "voxnet" backend of the
+        classifier; or, for any estimator, what hangs below the band in 270 numbers, or thirteen
+        numbers.
 
     Raises
     ------
     ValueError
-        If there is no such scene or engine.
+        If there is no such scene or engine, or no such features.
 
     References
     ----------
@@ -61,14 +65,25 @@ class Rope(System):
     configuration_dim = 6
     step_size = STEP_SIZE
     independent_parts = (slice(0, 3), slice(3, 6))
+    feature_kind = "voxels"
 
-    def __init__(self, scene: str | Scene = "simple_hook", engine: str = "mujoco") -> None:
+    def __init__(
+        self,
+        scene: str | Scene = "simple_hook",
+        engine: str = "mujoco",
+        features: str = "voxels",
+    ) -> None:
         if isinstance(scene, str):
             scene = load_scene(scene)
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene or the name of one, got {scene!r}.")
         if engine not in ENGINES:
             raise ValueError(f"engine must be one of {', '.join(ENGINES)}, got {engine!r}.")
+        if features not in FEATURES:
+            raise ValueError(f"features must be one of {', '.join(FEATURES)}, got {features!r}.")
+        # Collected data know their rope by its hash, which the default must leave as it was.
+        if features != self.feature_kind:
+            self.feature_kind = features
         self.scene = scene
         self.engine = engine
         self.reduced_dim = reduced_dim(scene)
@@ -138,9 +153,17 @@ class Rope(System):
         """Say whether bands are near one another and of one homotopy class: Close."""
         return bands_close(predicted, executed, self.scene)
 
-    def features(self, reduced: Array, next_reduced: Array) -> Array:
-        """Return (n, 13) rows: lengths, and what could catch the rope between the grippers."""
-        return vector_features(reduced, next_reduced, self.scene)
+    def features(self, reduced: Array, next_reduced: Array) -> NDArray[Any]:
+        """Describe transitions to an estimator.
+
+        Returns
+        -------
+        X : ndarray of shape (n, n_features)
+            With "voxels", uint8 of 12288 features: see
+            :func:`systems.rope_voxels.voxel_features`. With "vector", float64 of 13: see
+            :func:`systems.rope_features.vector_features`.
+        """
+        return FEATURES[self.feature_kind](reduced, next_reduced, self.scene)
 
     def scene_problem(self) -> Problem:
         """Return the scene's own start, at rest, and its goal."""

@@ -1,15 +1,20 @@
-"""Features of rope transitions for classifiers of vectors."""
+"""Features of rope transitions: for classifiers of vectors, and by name."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from systems.band import band_length, reduced_dim
 from systems.obstacles import Array
+from systems.rope_curtain import curtain_features
 from systems.rope_feature_kernels import CELL, fill_components
 from systems.rope_scene import Scene
+from systems.rope_voxels import voxel_features
 from systems.validation import as_finite_array
 
 
@@ -61,3 +66,10 @@ def _slice_parts(rows: Array, scene: Scene) -> Array:
     counts = np.empty((len(rows), 2))
     fill_components(rows, scene.packed, scene.max_band_length, cells, stack, counts)
     return np.column_stack([counts.sum(axis=1), counts])
+
+
+FEATURES: dict[str, Callable[[Array, Array, Scene], NDArray[Any]]] = {
+    "voxels": voxel_features,
+    "curtain": curtain_features,
+    "vector": vector_features,
+}

@@ -264,7 +264,7 @@ def test_diverging_training_stops_and_says_so():
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"backend": "forest"}, 'backend must be "mlp" or a class of torch modules'),
+        ({"backend": "forest"}, 'backend must be "mlp", "voxnet" or a class of torch modules'),
         ({"hidden_layer_sizes": (8, 0)}, "hidden_layer_sizes must be a positive integer, got 0"),
         ({"hidden_layer_sizes": 8}, "hidden_layer_sizes must be a tuple of positive integers"),
         ({"max_epochs": 0}, "max_epochs must be a positive integer, got 0"),

@@ -138,7 +138,7 @@ def test_thirteen_features_see_a_hook_between_rope_and_grippers():
     high = Scene([Box((0.0, 0.0, 0.8), (0.1, 0.1, 0.1))], **grippers)
     rows = []
     for scene in (high, Scene([beam], **grippers | {"rope_length": 0.41})):
-        rope = Rope(scene)
+        rope = Rope(scene, features="vector")
         row = np.zeros((1, rope.reduced_dim))
         row[0, :12] = np.tile(start.ravel(), 2)
         row[0, 12:] = np.tile(start[1], (rope.reduced_dim - 12) // 3)
@@ -176,7 +176,10 @@ def test_collected_data_are_compact_and_resume(rope, tmp_path):
     assert data.nbytes < 600 * len(data)
     size = sum(file.stat().st_size for file in (tmp_path / "data").glob("*.npz"))
     assert size < 600 * len(data) + 4000
-    assert data.features(rope).shape == (len(data), 13)
+    rows = data.features(rope)
+    assert rows.shape == (len(data), 12288)
+    assert rows.dtype == np.uint8
+    assert data.features(Rope(features="vector")).shape == (len(data), 13)
 
 
 def test_ropes_pickle_and_hash_alike_before_and_after_use(rope):
@@ -195,6 +198,7 @@ def test_ropes_pickle_and_hash_alike_before_and_after_use(rope):
         ({"scene": "no_hook"}, "scene must be one of simple_hook_short"),
         ({"scene": 3}, "scene must be a Scene or the name of one, got 3"),
         ({"engine": "bullet"}, "engine must be one of mujoco, pybullet, got 'bullet'"),
+        ({"features": "pixels"}, "features must be one of voxels, vector, got 'pixels'"),
     ],
 )
 def test_unknown_scenes_and_engines_are_refused(arguments, message):

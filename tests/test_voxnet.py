@@ -1,0 +1,279 @@
+"""The classifier on voxel grids: learning, checkpoints, bad rows, scikit-learn's conventions."""
+
+import itertools
+
+import joblib
+import numpy as np
+import pytest
+import torch
+from sklearn.base import clone
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
+from sklearn.utils.estimator_checks import parametrize_with_checks
+
+from planners.check_transition import CheckTransition
+from reliability import TransitionReliabilityClassifier
+from reliability.persistence import ModelFileError
+from reliability.voxnet import VoxNet, transformed, unpacked, unpacked_on_device
+from systems import Rope
+
+QUICK = {"max_epochs": 6, "batch_size": 16, "learning_rate": 3e-3, "random_state": 0}
+
+
+def voxnet(**parameters):
+    return TransitionReliabilityClassifier("voxnet", **QUICK | parameters)
+
+
+def packed(cells):
+    return np.packbits(cells.reshape(len(cells), -1), axis=1)
+
+
+def hits(n, side=16):
+    """Packed grids in which a block and a line are near one another or not, and which."""
+    rng = np.random.default_rng(0)
+    cells = np.zeros((n, 3, side, side, side), dtype=np.uint8)
+    y = rng.integers(0, 2, n)
+    for grid, hit in zip(cells, y, strict=True):
+        x = rng.integers(3, side - 3)
+        grid[0, x - 2 : x + 2, 4:12] = 1
+        line = x if hit else (x + side // 2) % side
+        grid[1:, line, :, side // 2] = 1
+    return packed(cells), y
+
+
+@pytest.fixture(scope="module")
+def data():
+    return hits(240)
+
+
+@pytest.fixture(scope="module")
+def fitted(data):
+    X, y = data
+    return voxnet(max_epochs=12).fit(X, y)
+
+
+def expected_failures(estimator):
+    return {
+        "check_sample_weight_equivalence_on_dense_data": (
+            "sample_weight is not equivalent to removing/repeating samples."
+        )
+    }
+
+
+@parametrize_with_checks(
+    [voxnet(max_epochs=15, validation_fraction=0.2)], expected_failed_checks=expected_failures
+)
+@pytest.mark.filterwarnings("ignore:The training rows are all of one class")
+@pytest.mark.filterwarnings("ignore::sklearn.exceptions.SkipTestWarning")
+def test_scikit_learns_own_checks(estimator, check):
+    check(estimator)
+
+
+def test_it_learns_whether_a_band_is_near_an_obstacle(data, fitted):
+    X, y = data
+    assert fitted.score(X, y) > 0.95
+    assert fitted.validation_accuracy_ > 0.8
+    assert fitted.n_features_in_ == 1536
+    assert len(fitted.history_) == 12
+
+
+class KilledError(Exception):
+    pass
+
+
+def killed_in_epoch(monkeypatch, epoch):
+    """Have training killed in the middle of an epoch."""
+    forward, calls = VoxNet.forward, itertools.count()
+
+    def die(self, rows):
+        if next(calls) >= epoch:
+            raise KilledError
+        return forward(self, rows)
+
+    monkeypatch.setattr(VoxNet, "forward", die)
+
+
+def assert_same_fit(one, other):
+    assert one.history_ == other.history_
+    assert one.validation_accuracy_ == other.validation_accuracy_
+    for name, array in one._state.items():
+        np.testing.assert_array_equal(array, other._state[name])
+
+
+@pytest.mark.parametrize(
+    "parameters", [{}, {"patience": 2, "max_epochs": 30}, {"augment": True, "rows_per_epoch": 50}]
+)
+def test_a_killed_training_goes_on_to_the_same_end(data, tmp_path, monkeypatch, parameters):
+    X, y = data
+    whole = voxnet(**parameters).fit(X, y)
+    path = tmp_path / "training"
+    kept = voxnet(**parameters, checkpoint=path)
+    per_epoch = 14 if "rows_per_epoch" not in parameters else 5
+    for n_batches in (per_epoch // 2, 2 * per_epoch + 1):
+        with monkeypatch.context() as patch:
+            killed_in_epoch(patch, n_batches)
+            with pytest.raises(KilledError):
+                kept.fit(X, y)
+    assert path.exists()
+    assert_same_fit(kept.fit(X, y), whole)
+    assert_same_fit(kept.fit(X, y), whole)
+    assert [file.name for file in tmp_path.iterdir()] == ["training"]
+
+
+def test_a_training_may_be_made_longer(data, tmp_path):
+    X, y = data
+    path = tmp_path / "training"
+    voxnet(max_epochs=2, checkpoint=path).fit(X, y)
+    longer = voxnet(max_epochs=4, checkpoint=path).fit(X, y)
+    assert_same_fit(longer, voxnet(max_epochs=4).fit(X, y))
+    with pytest.raises(ModelFileError, match="holds 4 epochs, more than max_epochs = 2"):
+        voxnet(max_epochs=2, checkpoint=path).fit(X, y)
+
+
+def test_a_checkpoint_of_another_training_is_refused(data, tmp_path):
+    X, y = data
+    path = tmp_path / "training"
+    voxnet(max_epochs=1, checkpoint=path).fit(X, y)
+    for parameters, message in (
+        ({"learning_rate": 1e-3}, "learning_rate = '0.003' where this fit has '0.001'"),
+        ({"random_state": 1}, "random_state = .* where this fit has"),
+    ):
+        with pytest.raises(ModelFileError, match=message):
+            voxnet(**{"max_epochs": 1, "checkpoint": path} | parameters).fit(X, y)
+    with pytest.raises(ModelFileError, match=r"data = .* another path"):
+        voxnet(max_epochs=1, checkpoint=path).fit(X[::-1], y)
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(ModelFileError, match="is truncated or no checkpoint"):
+        voxnet(max_epochs=1, checkpoint=path).fit(X, y)
+    with pytest.raises(ValueError, match="checkpoint needs a random_state"):
+        voxnet(checkpoint=path, random_state=None).fit(X, y)
+
+
+def test_the_mlp_has_checkpoints_too(tmp_path, rng):
+    X = rng.normal(size=(100, 3))
+    parameters = {"hidden_layer_sizes": (8,), "random_state": 0, "checkpoint": tmp_path / "mlp"}
+    TransitionReliabilityClassifier(max_epochs=3, **parameters).fit(X, X[:, 0] > 0)
+    resumed = TransitionReliabilityClassifier(max_epochs=6, **parameters).fit(X, X[:, 0] > 0)
+    del parameters["checkpoint"]
+    whole = TransitionReliabilityClassifier(max_epochs=6, **parameters).fit(X, X[:, 0] > 0)
+    assert_same_fit(resumed, whole)
+
+
+@pytest.mark.parametrize("pooling", [1, 2, 4])
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_grids_are_unpacked_and_pooled_alike_everywhere(pooling, channels, rng):
+    cells = (rng.random((3, channels, 32, 32, 32)) < 0.1).astype(np.uint8)
+    rows = torch.from_numpy(packed(cells))
+    seen = 32 // pooling
+    cubes = cells.reshape(3, channels, seen, pooling, seen, pooling, seen, pooling)
+    expected = cubes.max(axis=(3, 5, 7)).astype(np.float32)
+    expected[:, 0] = cubes[:, 0].mean(axis=(2, 4, 6))
+    for unpack in (unpacked, unpacked_on_device):
+        np.testing.assert_array_equal(unpack(rows, channels, 32, pooling).numpy(), expected)
+
+
+@pytest.mark.parametrize("side", [16, 32, 64])
+def test_symmetries_turn_and_mirror_about_the_vertical(side, rng):
+    cells = (rng.random((8, 2, side, side, side)) < 0.2).astype(np.uint8)
+    cells[1:] = cells[0]
+    moved = transformed(torch.from_numpy(packed(cells)), 2, side, torch.arange(8)).numpy()
+    grids = np.unpackbits(moved, axis=1).reshape(cells.shape)
+    for k in range(4):
+        turned = np.rot90(cells[0], k, axes=(1, 2))
+        np.testing.assert_array_equal(grids[k], turned)
+        np.testing.assert_array_equal(grids[4 + k], turned.swapaxes(1, 2))
+    assert len({grid.tobytes() for grid in grids}) == 8
+
+
+@pytest.mark.parametrize("augment", [False, True])
+@pytest.mark.parametrize("pooling", [1, 2])
+def test_a_rows_logit_is_the_same_in_every_batch_but_for_rounding(pooling, augment):
+    X, y = hits(40, side=32)
+    network = voxnet(max_epochs=1, rows_per_epoch=32, pooling=pooling, augment=augment).fit(X, y)
+    together = network.decision_function(X)
+    for n_rows in (1, 5, 8):
+        parts = [network.fast_decision_function(X[i : i + n_rows]) for i in range(0, 40, n_rows)]
+        np.testing.assert_allclose(np.concatenate(parts), together, rtol=1e-5, atol=1e-6)
+    assert network.history_[0]["train_loss"] > 0
+
+
+def test_a_model_on_disk_is_small_and_the_same(data, fitted, tmp_path):
+    X, _ = data
+    joblib.dump(fitted, tmp_path / "model.joblib")
+    loaded = joblib.load(tmp_path / "model.joblib")
+    np.testing.assert_array_equal(loaded.predict_proba(X), fitted.predict_proba(X))
+    n_weights = sum(array.size for array in fitted._state.values())
+    assert (tmp_path / "model.joblib").stat().st_size < 4 * n_weights + 10_000
+    loaded.set_params(device="cuda")
+    joblib.dump(loaded, tmp_path / "elsewhere.joblib")
+    elsewhere = joblib.load(tmp_path / "elsewhere.joblib")
+    if not torch.cuda.is_available():
+        np.testing.assert_array_equal(elsewhere.predict(X), fitted.predict(X))
+
+
+def test_clones_pipelines_and_files_as_data(data, tmp_path):
+    X, y = data
+    np.save(tmp_path / "X.npy", X)
+    mapped = np.load(tmp_path / "X.npy", mmap_mode="r")
+    network = voxnet(max_epochs=2)
+    plain = clone(network).fit(mapped, y)
+    pipeline = make_pipeline(FunctionTransformer(), network).fit(X, y)
+    np.testing.assert_array_equal(pipeline.predict_proba(X), plain.predict_proba(mapped))
+    by_plan = clone(network).fit(X, y, groups=np.arange(len(X)) // 8)
+    assert 0 <= by_plan.validation_accuracy_ <= 1
+
+
+def test_packed_rows_of_another_kind_are_refused(data, fitted):
+    X, y = data
+    for call, message in (
+        (lambda: fitted.predict(X[:, :-1]), "has 1535 features, but .* is expecting 1536"),
+        (lambda: fitted.predict(X.astype(float)), "uint8 rows of 1536 bytes .3 channels of 16 x"),
+        (lambda: fitted.predict(X.tolist()), "that this model was trained on, .* got list"),
+        (lambda: voxnet().fit(X[:, :13], y), "X of uint8 must hold bit-packed grids, .* got 13"),
+        (lambda: voxnet(pooling=2).fit(X, y), "pooling must leave at least 12 cells a side, got 2"),
+        (lambda: voxnet(pooling=3).fit(X, y), "pooling must be 1, 2 or 4, got 3"),
+        (lambda: voxnet(rows_per_epoch=0).fit(X, y), "rows_per_epoch must be a positive integer"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            call()
+
+
+def test_planners_refuse_a_model_of_another_grid(fitted):
+    arguments = {"k": 1.0, "accuracy": None, "rng": np.random.default_rng(0)}
+    with pytest.raises(ValueError, match="fitted on 1536 features, and Rope gives 12288"):
+        CheckTransition(Rope(), fitted, **arguments)
+
+
+def test_planners_ask_in_batches_and_get_the_models_answers(rng):
+    rope = Rope()
+    rows = np.tile(rope.scene.start.ravel(), (20, rope.reduced_dim // 6))
+    after = rows + np.tile(rng.normal(size=(20, 6)) * 0.01, rope.reduced_dim // 6)
+    X = rope.features(rows, after)
+    network = voxnet(max_epochs=1, pooling=2).fit(X, np.arange(20) % 2)
+    check = CheckTransition(rope, network, k=1.0, accuracy=0.9, rng=rng)
+    assert not check.answers_fast
+    np.testing.assert_array_equal(check.classify(rows, after), network.predict(X) == 1)
+    probability = check.probability(rows, after)
+    np.testing.assert_allclose(probability, network.predict_proba(X)[:, 1])
+
+
+def test_an_epoch_may_be_a_part_of_the_rows(data, capsys):
+    X, y = data
+    network = voxnet(max_epochs=3, rows_per_epoch=40, validation_fraction=0.5, verbose=1)
+    network.fit(X, y)
+    shown = capsys.readouterr().err
+    assert "epoch 3/3" in shown
+    assert "9/9" in shown, "batches of 16, 16 and 8 rows"
+    assert "loss=" in shown
+    assert "held-out accuracy=" in shown
+    for epoch in network.history_:
+        assert (40 * epoch["valid_accuracy"]) % 1 == pytest.approx(0, abs=1e-9)
+    assert (120 * network.validation_accuracy_) % 1 == pytest.approx(0, abs=1e-9)
+    more = voxnet(max_epochs=1, rows_per_epoch=500, balanced_batches=False).fit(X, y)
+    assert len(more.history_) == 1
+
+
+def test_diverging_training_stops_and_says_so(data):
+    X, y = data
+    with pytest.raises(FloatingPointError, match="Training diverged in epoch 1"):
+        voxnet(learning_rate=1e38, mixed_precision=False).fit(X, y)
