@@ -14,8 +14,10 @@ if TYPE_CHECKING:
     from systems.contract_checks import check_system
     from systems.obstacles import Box, Capsule, Cylinder
     from systems.planar_arm import PlanarArm
+    from systems.random_rope_scenes import random_rope_scene
     from systems.rope import Rope
     from systems.rope_scene import Scene
+    from systems.rope_scenes import load_scene
 
 __all__ = [
     "Box",
@@ -35,7 +37,9 @@ __all__ = [
     "System",
     "SystemContractError",
     "check_system",
+    "load_scene",
     "random_car_scene",
+    "random_rope_scene",
 ]
 
 _HOMES = {
@@ -50,7 +54,9 @@ _HOMES = {
     "Rope": "systems.rope",
     "Scene": "systems.rope_scene",
     "check_system": "systems.contract_checks",
+    "load_scene": "systems.rope_scenes",
     "random_car_scene": "systems.car_scenes",
+    "random_rope_scene": "systems.random_rope_scenes",
 }
 
 
