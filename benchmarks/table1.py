@@ -1,10 +1,11 @@
 """The paper's Table I: rope plans with and without a classifier, executed in every scene.
 
-Run as ``python benchmarks/table1.py --jobs 2`` for the column without a classifier, and with
-``--model rope.joblib`` for any fitted estimator of the rope's features. Every trial starts at
-the scene's start and has a seed of its own. A trial is a success if its plan is found within
-the time limit and its execution ends within 0.025 m of the goal. Each finished trial is a file
-in ``--out``: a run that was interrupted goes on where it stopped.
+Run as ``python benchmarks/table1.py --jobs 2``. Every trial starts at the scene's start and has
+a seed of its own, the same in all columns. It is a success if its plan is found within the time
+limit and its execution ends within 0.025 m of the goal. Each finished trial is a file in
+``--out``: a run that was interrupted goes on where it stopped. Columns are ``none``, models that
+come with the examples (``paper``, ``ours``, ``vector``), or the joblib file of any fitted
+estimator of the rope's features.
 """
 
 from __future__ import annotations
@@ -21,11 +22,20 @@ import numpy as np
 from scipy.stats import binomtest
 
 from planners import BiasedRRT
+from reliability import load_estimator
 from systems import Problem, Rope, SimulationDivergedError
+from systems.rope_features import FEATURES
 from systems.rope_scenes import SCENE_NAMES
 
 TOLERANCE = 0.025
 MAX_ITERATIONS = 10**8
+MODELS = Path(__file__).parents[1] / "examples" / "models"
+COLUMNS = {
+    "none": None,
+    "paper": MODELS / "rope_paper.joblib",
+    "ours": MODELS / "rope_ours.joblib",
+    "vector": MODELS / "rope_vector.joblib",
+}
 # Successes of 30, planning and smoothing seconds, without a classifier and with VoxNet.
 PAPER = {
     "simple_hook_short": ((18, 0.6, 1.0), (30, 14.6, 5.4)),
@@ -41,10 +51,11 @@ PAPER = {
 def main(arguments: list[str] | None = None) -> None:
     """Run the trials that are missing and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--columns", nargs="+", default=["none"], help="names or joblib files")
+    parser.add_argument("--features", choices=FEATURES, default="voxels", help="of such files")
     parser.add_argument("--scenes", nargs="+", choices=SCENE_NAMES, default=SCENE_NAMES)
     parser.add_argument("--seeds", type=int, default=30, help="trials per scene")
     parser.add_argument("--first-seed", type=int, default=0)
-    parser.add_argument("--model", type=Path, help="joblib file of an estimator; default: none")
     parser.add_argument("--k", type=float, default=10.0)
     parser.add_argument("--accuracy", type=float, help="p_acc; default: the model's own")
     parser.add_argument("--engine", choices=("mujoco", "pybullet"), default="mujoco")
@@ -53,50 +64,62 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, default=Path("build/table1"))
     options = parser.parse_args(arguments)
     seeds = range(options.first_seed, options.first_seed + options.seeds)
-    folder = options.out / _description(options)
+    paths = {name: COLUMNS.get(name, Path(name)) for name in options.columns}
+    folders = {name: options.out / _description(path, options) for name, path in paths.items()}
     tasks = [
-        joblib.delayed(run_trial)(scene, seed, options, folder)
-        for scene in options.scenes
+        joblib.delayed(run_trial)(scene, seed, paths[name], options, folders[name])
         for seed in seeds
+        for scene in options.scenes
+        for name in options.columns
     ]
-    trials = joblib.Parallel(n_jobs=options.jobs, verbose=5)(tasks)
-    rows = {scene: [t for t in trials if t["scene"] == scene] for scene in options.scenes}
-    table = format_table(rows, column=0 if options.model is None else 1)
-    (folder / "table.md").write_text(table)
-    print(f"{table}\nTrials and table are in {folder}.")
+    trials = iter(joblib.Parallel(n_jobs=options.jobs, verbose=5)(tasks))
+    rows: dict[str, dict[str, list[dict[str, Any]]]] = {
+        scene: {name: [] for name in options.columns} for scene in options.scenes
+    }
+    for _ in seeds:
+        for scene in options.scenes:
+            for name in options.columns:
+                rows[scene][name].append(next(trials))
+    table = format_table(rows)
+    options.out.joinpath("table.md").write_text(table)
+    print(f"{table}\nTrials and table are in {options.out}.")
 
 
-def _description(options: argparse.Namespace) -> str:
+def _description(path: Path | None, options: argparse.Namespace) -> str:
     """Name a folder after everything that makes trials differ."""
     planner = "none"
-    if options.model is not None:
-        digest = joblib.hash(joblib.load(options.model))[:8]
+    if path is not None:
+        digest = joblib.hash(load_estimator(path))[:8]
         accuracy = "own" if options.accuracy is None else f"{options.accuracy:g}"
-        planner = f"{options.model.stem}-{digest}-k{options.k:g}-accuracy-{accuracy}"
+        planner = f"{path.stem}-{digest}-k{options.k:g}-accuracy-{accuracy}"
     return f"{planner}-{options.engine}-{options.time_limit:g}s"
 
 
 @cache
-def _scene(name: str, engine: str) -> tuple[Rope, Problem, np.ndarray]:
-    rope = Rope(name, engine)
+def _scene(name: str, engine: str, features: str) -> tuple[Rope, Problem, np.ndarray]:
+    rope = Rope(name, engine, features)
     problem = rope.scene_problem()
     return rope, problem, rope.reduce(problem.start)
 
 
 @cache
 def _model(path: Path | None) -> Any:
-    return None if path is None else joblib.load(path)
+    return None if path is None else load_estimator(path)
 
 
-def run_trial(name: str, seed: int, options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+def run_trial(
+    name: str, seed: int, model: Path | None, options: argparse.Namespace, folder: Path
+) -> dict[str, Any]:
     """Plan and execute once, or read what an earlier run found."""
     file = folder / name / f"seed-{seed:03d}.json"
     if file.exists():
         return dict(json.loads(file.read_text()))
-    rope, problem, start = _scene(name, options.engine)
+    estimator = _model(model)
+    features = getattr(estimator, "provenance_", {}).get("features", options.features)
+    rope, problem, start = _scene(name, options.engine, features)
     planner = BiasedRRT(
         rope,
-        _model(options.model),
+        estimator,
         k=options.k,
         accuracy=options.accuracy,
         max_iterations=MAX_ITERATIONS,
@@ -138,33 +161,38 @@ def _execute(rope: Rope, problem: Problem, commands: np.ndarray, solved: bool) -
     }
 
 
-def format_table(trials: dict[str, list[dict[str, Any]]], column: int) -> str:
-    """Return the table as text; ``column`` is that of the paper to print beside it."""
+def format_table(trials: dict[str, dict[str, list[dict[str, Any]]]]) -> str:
+    """Return the table as text; trials are per scene and column."""
     lines = [
-        "| scene | success | 95 % | paper | planning (s) | paper | smoothing (s) | paper | "
-        "transitions | no plan |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| scene | planner | success | 95 % | paper | planning (s) | paper | smoothing (s) | paper "
+        "| transitions | no plan |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
-    for name, rows in trials.items():
-        n_successes = sum(row["success"] for row in rows)
-        interval = binomtest(n_successes, len(rows)).proportion_ci(method="wilson")
-        paper = PAPER[name][column]
-        solved = [row for row in rows if row["solved"]]
-        lengths = [row["n_transitions"] for row in solved] or [0]
-        cells = (
-            name,
-            f"{n_successes}/{len(rows)}",
-            f"{interval.low:.0%} to {interval.high:.0%}",
-            f"{paper[0]}/30",
-            f"{np.mean([row['planning'] for row in rows]):.1f}",
-            f"{paper[1]}",
-            f"{np.mean([row['smoothing'] for row in rows]):.1f}",
-            f"{paper[2]}",
-            f"{np.mean(lengths):.0f}",
-            f"{len(rows) - len(solved)}",
-        )
-        lines.append("| " + " | ".join(cells) + " |")
+    for scene, columns in trials.items():
+        for name, rows in columns.items():
+            lines.append("| " + " | ".join(_cells(scene, name, rows)) + " |")
     return "\n".join(lines) + "\n"
+
+
+def _cells(scene: str, name: str, rows: list[dict[str, Any]]) -> tuple[str, ...]:
+    n_successes = sum(row["success"] for row in rows)
+    interval = binomtest(n_successes, len(rows)).proportion_ci(method="wilson")
+    paper = PAPER[scene][name != "none"]
+    solved = [row for row in rows if row["solved"]]
+    lengths = [row["n_transitions"] for row in solved] or [0]
+    return (
+        scene,
+        name,
+        f"{n_successes}/{len(rows)}",
+        f"{interval.low:.0%} to {interval.high:.0%}",
+        f"{paper[0]}/30",
+        f"{np.mean([row['planning'] for row in rows]):.1f}",
+        f"{paper[1]}",
+        f"{np.mean([row['smoothing'] for row in rows]):.1f}",
+        f"{paper[2]}",
+        f"{np.mean(lengths):.0f}",
+        f"{len(rows) - len(solved)}",
+    )
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import numpy as np
 
 from planners import BiasedRRT
 from reliability import Transitions, collect_transitions
-from systems import Rope, Scene, load_scene, random_rope_scene
+from systems import Rope, Scene, random_rope_scene
 
 PAPER_SEED = 2020
 RANDOM_SCENE_SEED = 2021

@@ -24,6 +24,9 @@ def test_trials_resume_and_any_estimator_fits(tmp_path, capsys):
 
     model = DummyClassifier(strategy="constant", constant=1)
     joblib.dump(model.fit(np.zeros((2, 13)), [0, 1]), tmp_path / "all.joblib")
-    table1.main([*options, "--model", str(tmp_path / "all.joblib"), "--accuracy", "0.9"])
-    assert "| 10/30 |" in capsys.readouterr().out
+    columns = ["--columns", "none", str(tmp_path / "all.joblib"), "--features", "vector"]
+    table1.main([*options, *columns, "--accuracy", "0.9"])
+    output = capsys.readouterr().out
+    assert "| 1/30 |" in output
+    assert "| 10/30 |" in output
     assert len(list(tmp_path.rglob("seed-*.json"))) == 4

@@ -1,0 +1,132 @@
+"""What the curtain's features see, against a plain reference, and what they do not depend on."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from planners import BiasedRRT
+from systems import Box, Rope, Scene, check_system, random_rope_scene
+from systems.band import band_length, band_points
+from systems.distance import signed_distance
+from systems.rope_curtain import curtain_features
+
+N_COLUMNS, N_ROWS, DEPTH = 16, 8, 1.2
+
+
+def states_of(rope, seed=0):
+    start = rope.reduce(rope.scene_problem().start)
+    planner = BiasedRRT(rope, max_iterations=3000, simplify=False, random_state=seed)
+    result = planner.plan(start, rope.scene.goal.ravel())
+    tree = result.reduced
+    return tree[:-1], tree[1:]
+
+
+def bend_of(width, rise, length):
+    """Solve for b such that rise / width * s - b * s * (width - s) has a length."""
+
+    def excess(bend):
+        def speed(s):
+            return np.hypot(1.0, rise / width - bend * (width - 2 * s))
+
+        return quad(speed, 0.0, width, limit=200)[0] - length
+
+    return brentq(excess, 0.0, 1e4) if excess(0.0) < 0 else 0.0
+
+
+def reference_curtain(row, scene):
+    points = band_points(row)
+    shadow = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1)
+    travelled = np.concatenate([[0.0], np.cumsum(shadow)])
+    width, rise = travelled[-1], points[-1, 2] - points[0, 2]
+    at = (np.arange(N_COLUMNS) + 0.5) / N_COLUMNS
+    on_band = np.column_stack([np.interp(at * width, travelled, column) for column in points.T])
+    bend = bend_of(width, rise, scene.rope_length)
+    sag = bend * width**2 * at * (1 - at)
+    share = DEPTH * np.arange(1, N_ROWS + 1) / N_ROWS
+    samples = np.repeat(on_band[:, None], N_ROWS, axis=1)
+    samples[..., 2] -= sag[:, None] * share
+    distances = signed_distance(samples.reshape(-1, 3), scene.packed)
+    return np.clip(distances, -0.05, 0.15) / 0.05, bend * width**2 / 4
+
+
+@pytest.mark.parametrize("name", ["simple_hook", "engine_assembly"])
+def test_it_agrees_with_a_plain_reference(name):
+    rope = Rope(name, features="curtain")
+    before, after = (rows[::12] for rows in states_of(rope))
+    rows = rope.features(before, after)
+    assert rows.shape == (len(before), 270)
+    n_cells, length = N_COLUMNS * N_ROWS, rope.scene.rope_length
+    for i, state in enumerate(before):
+        expected, depth = reference_curtain(state, rope.scene)
+        np.testing.assert_allclose(rows[i, :n_cells], expected, atol=1e-4)
+        lengths = [
+            np.linalg.norm(state[3:6] - state[:3]),
+            band_length(state[None])[0],
+            state[5] - state[2],
+            depth,
+        ]
+        np.testing.assert_allclose(
+            rows[i, n_cells : n_cells + 4], np.divide(lengths, length), atol=1e-5
+        )
+    np.testing.assert_array_equal(
+        rows[:, n_cells + 4 : -6], rope.features(after, after)[:, : n_cells + 4]
+    )
+
+
+def test_a_bar_below_the_band_is_seen_where_it_is():
+    bar = Box((0.0, 0.0, -0.1), (0.5, 0.02, 0.02), "bar")
+    grippers = np.array([[0.0, -0.3, 0.0], [0.0, 0.3, 0.0]])
+    away = grippers + np.array([0.7, 0.0, 0.0])
+    scene = Scene([bar], np.array([[-1, -1, -1], [1, 1, 1]]), 0.8, away, grippers)
+    band = np.concatenate([grippers.ravel(), grippers.ravel()])
+    width = Rope(scene).reduced_dim
+    row = np.concatenate([band, np.tile(grippers[1], (width - 12) // 3)])[None]
+    cells = curtain_features(row, row, scene)[0, : N_COLUMNS * N_ROWS].reshape(N_COLUMNS, N_ROWS)
+    inside = np.argwhere(cells < 0)
+    assert set(inside[:, 0]) == {7, 8}, "the bar crosses the middle of the band"
+    assert 0 < inside[:, 1].min() <= inside[:, 1].max() < N_ROWS - 1, "and hangs above the rope"
+
+
+def test_turning_the_world_changes_nothing():
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    shift = np.array([0.3, -0.2, 0.1])
+    bar = Box((0.1, 0.05, -0.1), (0.3, 0.02, 0.04))
+    turned_bar = Box(tuple(turn @ bar.center + shift), (0.02, 0.3, 0.04))
+    ends = np.array([[0.7, -0.3, 0.0], [0.7, 0.3, 0.1]])
+    box = np.array([[-2.0] * 3, [2.0] * 3])
+    scene = Scene([bar], box, 0.8, ends, ends - np.array([1.4, 0.0, 0.0]))
+    turned = Scene([turned_bar], box, 0.8, ends @ turn.T + shift, ends @ turn.T + shift)
+    rng = np.random.default_rng(0)
+    n_points = (Rope(scene).reduced_dim - 6) // 3
+    points = rng.uniform(-0.3, 0.3, size=(20, 2, n_points, 3))
+    points[:, :, 4:] = points[:, :, 3:4]
+
+    def rows_of(points):
+        ends = points[:, :, [0, -1]].reshape(*points.shape[:2], 6)
+        return np.concatenate([ends, points.reshape(*points.shape[:2], -1)], axis=2)
+
+    here, there = rows_of(points), rows_of(points @ turn.T + shift)
+    np.testing.assert_allclose(
+        curtain_features(here[:, 0], here[:, 1], scene),
+        curtain_features(there[:, 0], there[:, 1], turned),
+        atol=1e-4,
+    )
+
+
+def test_the_rope_with_curtains_is_a_system():
+    check_system(Rope(features="curtain"))
+
+
+def test_random_scenes_follow_from_their_seed_and_can_be_planned_in():
+    scene, again = random_rope_scene(5), random_rope_scene(5)
+    np.testing.assert_array_equal(scene.packed, again.packed)
+    scenes = [random_rope_scene(seed) for seed in range(40)]
+    assert len({len(scene.obstacles) for scene in scenes}) > 4
+    lengths = [scene.rope_length for scene in scenes]
+    assert min(lengths) < 0.7
+    assert max(lengths) > 1.2
+    rope = Rope(scenes[0])
+    problem = rope.sample_problem(0)
+    planner = BiasedRRT(rope, max_iterations=5000, random_state=0)
+    assert planner.plan(rope.reduce(problem.start), problem.goal).success
