@@ -12,7 +12,8 @@ import numpy as np
 
 from planners import BiasedRRT
 from reliability import Transitions, collect_transitions
-from systems import Rope, Scene, random_rope_scene
+from systems import Problem, Rope, Scene, random_rope_scene
+from systems.validation import RandomState
 
 PAPER_SEED = 2020
 RANDOM_SCENE_SEED = 2021
@@ -46,6 +47,14 @@ def collect_simple_hook(folder: Path, n_plans: int, n_jobs: int) -> SceneData:
     return SceneData(rope.scene, transitions)
 
 
+class RopeFromItsStart(Rope):
+    """A rope whose problems are all the scene's own, as those that a plan is wanted for are."""
+
+    def sample_problem(self, random_state: RandomState = None) -> Problem:
+        """Return the scene's start and goal, whatever the random state."""
+        return self.scene_problem()
+
+
 def collect_random_scenes(
     folder: Path, scenes: range, n_plans: int, estimator: Any, n_jobs: int
 ) -> list[SceneData]:
@@ -60,7 +69,8 @@ def collect_random_scenes(
     n_plans : int
         Per scene.
     estimator : classifier of curtains, or None
-        Biases the planner.
+        Biases the planner, which then plans from each scene's own start. Without it, plans are
+        from starts all over the scene.
     n_jobs : int
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -75,7 +85,8 @@ def random_scene(i: int) -> Scene:
 
 
 def _collect_scene(folder: Path, i: int, n_plans: int, estimator: Any) -> SceneData | None:
-    rope = Rope(random_scene(i), features="curtain")
+    kind = Rope if estimator is None else RopeFromItsStart
+    rope = kind(random_scene(i), features="curtain")
     file, empty = folder / f"scene-{i:04d}.npz", folder / f"scene-{i:04d}.empty"
     if empty.exists():
         return None

@@ -108,9 +108,11 @@ def test_problems_start_at_rest_and_cover_the_world(rope):
     np.testing.assert_array_equal(again.start.nodes, problems[5].start.nodes)
     starts = np.array([problem.start.grippers.ravel() for problem in problems])
     assert starts[:, 0].min() < -0.9
-    assert starts[:, 0].max() > 0.0
+    assert starts[:, 0].max() > -0.5
+    assert (starts[:, 1] > 0.01).all(), "gripper A starts on its own side"
+    assert (starts[:, 4] < 0.01).all(), "gripper B starts on its own side"
     way = np.linalg.norm(starts - rope.scene.goal.ravel(), axis=1)
-    assert (way > 0.5 * np.linalg.norm(rope.scene.start - rope.scene.goal)).all()
+    assert (way > 0.75 * np.linalg.norm(rope.scene.start - rope.scene.goal)).all()
     for problem in problems[:6]:
         np.testing.assert_array_equal(problem.goal, rope.scene.goal.reshape(1, 6))
         assert signed_distance(problem.start.nodes, rope.scene.packed).min() > 0.005
@@ -198,7 +200,7 @@ def test_ropes_pickle_and_hash_alike_before_and_after_use(rope):
         ({"scene": "no_hook"}, "scene must be one of simple_hook_short"),
         ({"scene": 3}, "scene must be a Scene or the name of one, got 3"),
         ({"engine": "bullet"}, "engine must be one of mujoco, pybullet, got 'bullet'"),
-        ({"features": "pixels"}, "features must be one of voxels, vector, got 'pixels'"),
+        ({"features": "pixels"}, "features must be one of voxels, curtain, vector, got 'pixels'"),
     ],
 )
 def test_unknown_scenes_and_engines_are_refused(arguments, message):
