@@ -45,6 +45,26 @@ def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array
     return np.hstack(rows).astype(np.float32)
 
 
+def mirrored(features: Array) -> Array:
+    """Return the features of the same transitions in a mirror that stands along the rope."""
+    image = features.copy()
+    image[:, [-5, -2]] *= -1.0
+    return image
+
+
+def reversed_ends(features: Array) -> Array:
+    """Return the features of the same transitions with the names of the grippers exchanged."""
+    image = features.copy()
+    n_cells = N_COLUMNS * N_ROWS
+    for first in (0, n_cells + 4):
+        cells = features[:, first : first + n_cells].reshape(-1, N_COLUMNS, N_ROWS)
+        image[:, first : first + n_cells] = cells[:, ::-1].reshape(-1, n_cells)
+        image[:, first + n_cells + 2] *= -1.0
+    turned = np.array([-1.0, -1.0, 1.0], dtype=features.dtype)
+    image[:, -6:-3], image[:, -3:] = features[:, -3:] * turned, features[:, -6:-3] * turned
+    return image
+
+
 def _curtains(rows: Array, scene: Scene) -> Array:
     curtains, depths = np.empty((len(rows), N_COLUMNS * N_ROWS)), np.empty(len(rows))
     fill_curtains(rows, scene.packed, scene.rope_length, curtains, depths)

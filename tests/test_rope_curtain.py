@@ -9,7 +9,7 @@ from planners import BiasedRRT
 from systems import Box, Rope, Scene, check_system, random_rope_scene
 from systems.band import band_length, band_points
 from systems.distance import signed_distance
-from systems.rope_curtain import curtain_features
+from systems.rope_curtain import curtain_features, mirrored, reversed_ends
 
 N_COLUMNS, N_ROWS, DEPTH = 16, 8, 1.2
 
@@ -112,6 +112,34 @@ def test_turning_the_world_changes_nothing():
         curtain_features(there[:, 0], there[:, 1], turned),
         atol=1e-4,
     )
+
+
+def rows_of_points(points):
+    ends = points[:, [0, -1]].reshape(len(points), 6)
+    return np.concatenate([ends, points.reshape(len(points), -1)], axis=1)
+
+
+def test_symmetries_are_those_of_the_world():
+    bars = [Box((0.1, 0.05, -0.1), (0.3, 0.02, 0.04)), Box((-0.2, -0.1, 0.1), (0.02, 0.1, 0.02))]
+    across = [Box((bar.center[0], -bar.center[1], bar.center[2]), bar.half_extents) for bar in bars]
+    ends = np.array([[0.9, -0.3, 0.0], [0.9, 0.3, 0.1]])
+    world = np.array([[-2.0] * 3, [2.0] * 3])
+    scene, mirror_scene = (
+        Scene(parts, world, 0.8, ends, ends - np.array([1.8, 0, 0])) for parts in (bars, across)
+    )
+    rng = np.random.default_rng(1)
+    before = rng.uniform(-0.3, 0.3, size=(20, (Rope(scene).reduced_dim - 6) // 3, 3))
+    after = before + rng.uniform(-0.01, 0.01, size=before.shape)
+    X = curtain_features(rows_of_points(before), rows_of_points(after), scene)
+    other_way = curtain_features(
+        rows_of_points(before[:, ::-1].copy()), rows_of_points(after[:, ::-1].copy()), scene
+    )
+    np.testing.assert_allclose(reversed_ends(X), other_way, atol=2e-3)
+    flip = np.array([1.0, -1.0, 1.0])
+    image = curtain_features(
+        rows_of_points(before * flip), rows_of_points(after * flip), mirror_scene
+    )
+    np.testing.assert_allclose(mirrored(X), image, atol=1e-4)
 
 
 def test_the_rope_with_curtains_is_a_system():
