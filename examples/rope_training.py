@@ -1,112 +1,181 @@
-"""Data and training of the rope's models: Simple Hook alone, or with scenes drawn at random."""
+"""Training of the rope's models: the paper's VoxNet, ours on curtains, and one on vectors."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import joblib
 import numpy as np
+from rope_collection import (
+    N_PAPER_PLANS,
+    PAPER_SEED,
+    RANDOM_SCENE_SEED,
+    SceneData,
+    collect_random_scenes,
+    collect_simple_hook,
+    described,
+)
+from sklearn.ensemble import HistGradientBoostingClassifier
+from sklearn.model_selection import GroupShuffleSplit, ShuffleSplit
 
-from planners import BiasedRRT
-from reliability import Transitions, collect_transitions
-from systems import Problem, Rope, Scene, random_rope_scene
-from systems.validation import RandomState
+from reliability import TransitionReliabilityClassifier
+from systems.rope_curtain import mirrored, reversed_ends
 
-PAPER_SEED = 2020
-RANDOM_SCENE_SEED = 2021
-N_PAPER_PLANS = 4190
-PAPER_ITERATIONS = 10**5
-# A random scene may have no way through: giving up costs as much as a few plans.
-RANDOM_ITERATIONS = 8000
-K = 10.0
-
-
-@dataclass(frozen=True)
-class SceneData:
-    """Transitions of one scene."""
-
-    scene: Scene
-    transitions: Transitions
-
-
-def collect_simple_hook(folder: Path, n_plans: int, n_jobs: int) -> SceneData:
-    """Collect as the paper does: one scene, many starts, no classifier."""
-    rope = Rope("simple_hook")
-    transitions = collect_transitions(
-        rope,
-        BiasedRRT(rope, max_iterations=PAPER_ITERATIONS),
-        n_plans,
-        n_jobs=n_jobs,
-        random_state=PAPER_SEED,
-        path=folder / f"simple_hook-{n_plans}",
-        verbose=1,
-    )
-    return SceneData(rope.scene, transitions)
+TRAINING_SEED = 0
+HELD_OUT = 0.1
+# Scenes and plans per scene. The first round is planned without a classifier and from starts
+# all over the scenes, the others with what the rounds before have taught.
+ROUNDS = ((range(250), 4), (range(400, 465), 3), (range(500, 640), 3))
+PACKAGES = ("numpy", "scikit-learn", "skorch", "torch", "mujoco", "transition-reliability")
 
 
-class RopeFromItsStart(Rope):
-    """A rope whose problems are all the scene's own, as those that a plan is wanted for are."""
-
-    def sample_problem(self, random_state: RandomState = None) -> Problem:
-        """Return the scene's start and goal, whatever the random state."""
-        return self.scene_problem()
-
-
-def collect_random_scenes(
-    folder: Path, scenes: range, n_plans: int, estimator: Any, n_jobs: int
-) -> list[SceneData]:
-    """Collect a few plans in each of many random scenes; scenes without any plan are left out.
+def train_all(folder: Path, models: Path, n_jobs: int) -> None:
+    """Collect, train and save all three; data and checkpoints that are in ``folder`` are used.
 
     Parameters
     ----------
     folder : Path
-        Holds a file per scene; those that are there are read.
-    scenes : range
-        Numbers of the scenes.
-    n_plans : int
-        Per scene.
-    estimator : classifier of curtains, or None
-        Biases the planner, which then plans from each scene's own start. Without it, plans are
-        from starts all over the scene.
+        For data and checkpoints.
+    models : Path
+        For ``rope_paper.joblib``, ``rope_vector.joblib`` and ``rope_ours.joblib``.
     n_jobs : int
+        Processes that collect.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    tasks = (joblib.delayed(_collect_scene)(folder, i, n_plans, estimator) for i in scenes)
-    found = joblib.Parallel(n_jobs=n_jobs, verbose=5)(tasks)
-    return [data for data in found if data is not None]
+    simple_hook = collect_simple_hook(folder, N_PAPER_PLANS, n_jobs)
+    save(train_vector(simple_hook), models / "rope_vector.joblib")
+    save(train_ours(simple_hook, folder, n_jobs), models / "rope_ours.joblib")
+    save(train_paper(simple_hook, folder / "voxnet.checkpoint"), models / "rope_paper.joblib")
 
 
-def random_scene(i: int) -> Scene:
-    """Return one of the random scenes that data come from."""
-    return random_rope_scene(np.random.SeedSequence([RANDOM_SCENE_SEED, i]))
+def save(estimator: Any, path: Path) -> None:
+    """Write an estimator, small."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(".partial")
+    joblib.dump(estimator, partial, compress=("xz", 6))
+    os.replace(partial, path)
 
 
-def _collect_scene(folder: Path, i: int, n_plans: int, estimator: Any) -> SceneData | None:
-    kind = Rope if estimator is None else RopeFromItsStart
-    rope = kind(random_scene(i), features="curtain")
-    file, empty = folder / f"scene-{i:04d}.npz", folder / f"scene-{i:04d}.empty"
-    if empty.exists():
-        return None
-    if not file.exists():
-        planner = BiasedRRT(rope, estimator, k=K, max_iterations=RANDOM_ITERATIONS)
-        seed = np.random.SeedSequence([RANDOM_SCENE_SEED, 1, i])
-        try:
-            collect_transitions(rope, planner, n_plans, random_state=seed).save(file)
-        except ValueError:  # no room for a rope, or no way through
-            empty.touch()
-            return None
-    return SceneData(rope.scene, Transitions.load(file))
+def train_paper(simple_hook: SceneData, checkpoint: Path) -> Any:
+    """Train VoxNet by the paper's protocol, on grids of half the resolution.
+
+    Cells are pooled and an epoch draws 40,000 transitions, so that two cores need less than an
+    hour; a tenth of the transitions is held out for p_acc, whatever plan they are of. Another
+    tenth of the plans is kept apart.
+    """
+    X, y, plans = described([simple_hook], "voxels")
+    training, apart = _split(y, plans, HELD_OUT)
+    classifier = TransitionReliabilityClassifier(
+        "voxnet",
+        pooling=2,
+        rows_per_epoch=40_000,
+        checkpoint=str(checkpoint),
+        random_state=TRAINING_SEED,
+        verbose=1,
+    )
+    classifier.fit(X[training], y[training])
+    classifier.set_params(checkpoint=None)
+    classifier.provenance_ = provenance(
+        "voxels",
+        [simple_hook],
+        by_transition=classifier.validation_accuracy_,
+        by_plan=float(np.mean(classifier.predict(X[apart]) == y[apart])),
+    )
+    return classifier
 
 
-def described(parts: Sequence[SceneData], kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the features, labels and plans of all parts; plan ids differ between scenes."""
-    rows, labels, plans, first = [], [], [], 0
-    for part in parts:
-        rows.append(part.transitions.features(Rope(part.scene, features=kind)))
-        labels.append(part.transitions.y)
-        plans.append(part.transitions.plan + first)
-        first = int(plans[-1].max()) + 1
-    return np.concatenate(rows), np.concatenate(labels), np.concatenate(plans)
+def train_vector(simple_hook: SceneData) -> Any:
+    """Train gradient boosting on the thirteen numbers, on Simple Hook alone."""
+    X, y, plans = described([simple_hook], "vector")
+
+    def fitted(rows: np.ndarray) -> Any:
+        boosting = HistGradientBoostingClassifier(
+            class_weight="balanced", random_state=TRAINING_SEED
+        )
+        return boosting.fit(X[rows], y[rows])
+
+    accuracies = []
+    for groups in (None, plans):
+        training, apart = _split(y, groups, HELD_OUT)
+        accuracies.append(float(np.mean(fitted(training).predict(X[apart]) == y[apart])))
+    classifier = fitted(np.arange(len(y)))
+    classifier.validation_accuracy_ = accuracies[0]
+    classifier.provenance_ = provenance(
+        "vector", [simple_hook], by_transition=accuracies[0], by_plan=accuracies[1]
+    )
+    return classifier
+
+
+def train_ours(simple_hook: SceneData, folder: Path, n_jobs: int) -> Any:
+    """Train an MLP on curtains, round by round, and hold out whole plans."""
+    parts, classifier = [simple_hook], None
+    for i, (scenes, n_plans) in enumerate(ROUNDS):
+        parts += collect_random_scenes(folder / f"random{i}", scenes, n_plans, classifier, n_jobs)
+        classifier = fit_curtains(parts, by_plan=True)
+    classifier.provenance_ = provenance(
+        "curtain",
+        parts,
+        by_transition=fit_curtains(parts, by_plan=False).validation_accuracy_,
+        by_plan=classifier.validation_accuracy_,
+    )
+    return classifier
+
+
+def fit_curtains(parts: Sequence[SceneData], by_plan: bool) -> Any:
+    """Train on Simple Hook, which comes first, and random scenes.
+
+    Both weigh the same, and so do both labels in either. Each transition comes twice: as it is,
+    and in one of its three mirror images.
+    """
+    X, y, plans = described(parts, "curtain")
+    source = np.arange(len(y)) >= len(parts[0].transitions)
+    weight = np.zeros(len(y))
+    for kind in (2 * source + y == i for i in range(4)):
+        weight[kind] = len(y) / 4 / max(1, kind.sum())
+    image = _images(X, np.random.default_rng(TRAINING_SEED))
+    classifier = TransitionReliabilityClassifier(
+        max_epochs=10, learning_rate_decay=0.7, random_state=TRAINING_SEED
+    )
+    return classifier.fit(
+        np.concatenate([X, image]),
+        np.tile(y, 2),
+        groups=np.tile(plans if by_plan else np.arange(len(y)), 2),
+        sample_weight=np.tile(weight, 2),
+    )
+
+
+def _images(X: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    kind = rng.integers(1, 4, len(X))
+    images = X.copy()
+    images[kind % 2 == 1] = mirrored(images[kind % 2 == 1])
+    images[kind >= 2] = reversed_ends(images[kind >= 2])
+    return images
+
+
+def provenance(
+    features: str, parts: Sequence[SceneData], by_transition: float, by_plan: float
+) -> dict[str, Any]:
+    """Tell where a model comes from."""
+    return {
+        "command": "python examples/rope.py --train",
+        "features": features,
+        "seeds": {
+            "simple hook": PAPER_SEED,
+            "random scenes": RANDOM_SCENE_SEED,
+            "training": TRAINING_SEED,
+        },
+        "scenes": len(parts),
+        "plans": sum(len(np.unique(part.transitions.plan)) for part in parts),
+        "transitions": sum(len(part.transitions) for part in parts),
+        "accuracy by transition": by_transition,
+        "accuracy by plan": by_plan,
+        "versions": {name: version(name) for name in PACKAGES},
+    }
+
+
+def _split(y: np.ndarray, groups: np.ndarray | None, share: float) -> tuple[np.ndarray, np.ndarray]:
+    splitter = ShuffleSplit if groups is None else GroupShuffleSplit
+    return next(splitter(1, test_size=share, random_state=TRAINING_SEED).split(y, groups=groups))

@@ -39,9 +39,11 @@ def test_arm_example_gives_its_table_and_pictures(tmp_path):
     assert tables[0] == tables[1], "the same seeds, the same models"
 
 
-def test_rope_example_shows_a_plan_that_got_caught(tmp_path):
-    options = ("engine_assembly", "--size", 160, 120, "--out", tmp_path)
+def test_rope_example_shows_a_rope_that_got_caught_and_one_that_did_not(tmp_path):
+    options = ("simple_hook_short", "--size", 160, 120, "--plans", 8, "--out", tmp_path)
     shown = run(ROOT / "examples" / "rope.py", *options, cwd=tmp_path)
+    assert "without a classifier: planned in" in shown
     assert "stopped there" in shown
-    pictures = {file.name for file in (tmp_path / "engine_assembly").iterdir()}
-    assert {"caught.png", "caught.gif"} <= pictures
+    assert "Every command was carried out" in shown
+    pictures = {file.name for file in (tmp_path / "simple_hook_short").iterdir()}
+    assert pictures == {"caught.png", "worked.png", "caught_and_worked.gif"}

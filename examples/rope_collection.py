@@ -1,0 +1,112 @@
+"""Data of the rope's models: the paper's Simple Hook, and scenes drawn at random."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+
+from planners import BiasedRRT
+from reliability import Transitions, collect_transitions
+from systems import Problem, Rope, Scene, random_rope_scene
+from systems.validation import RandomState
+
+PAPER_SEED = 2020
+RANDOM_SCENE_SEED = 2021
+N_PAPER_PLANS = 4190
+PAPER_ITERATIONS = 10**5
+# A random scene may have no way through: giving up costs as much as a few plans.
+RANDOM_ITERATIONS = 8000
+K = 10.0
+
+
+@dataclass(frozen=True)
+class SceneData:
+    """Transitions of one scene."""
+
+    scene: Scene
+    transitions: Transitions
+
+
+def collect_simple_hook(folder: Path, n_plans: int, n_jobs: int) -> SceneData:
+    """Collect as the paper does: one scene, many starts, no classifier."""
+    rope = Rope("simple_hook")
+    transitions = collect_transitions(
+        rope,
+        BiasedRRT(rope, max_iterations=PAPER_ITERATIONS),
+        n_plans,
+        n_jobs=n_jobs,
+        random_state=PAPER_SEED,
+        path=folder / f"simple_hook-{n_plans}",
+        verbose=1,
+    )
+    return SceneData(rope.scene, transitions)
+
+
+class RopeFromItsStart(Rope):
+    """A rope whose problems are all the scene's own, as those that a plan is wanted for are."""
+
+    def sample_problem(self, random_state: RandomState = None) -> Problem:
+        """Return the scene's start and goal, whatever the random state."""
+        return self.scene_problem()
+
+
+def collect_random_scenes(
+    folder: Path, scenes: range, n_plans: int, estimator: Any, n_jobs: int
+) -> list[SceneData]:
+    """Collect a few plans in each of many random scenes; scenes without any plan are left out.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds a file per scene; those that are there are read.
+    scenes : range
+        Numbers of the scenes.
+    n_plans : int
+        Per scene.
+    estimator : classifier of curtains, or None
+        Biases the planner, which then plans from each scene's own start. Without it, plans are
+        from starts all over the scene.
+    n_jobs : int
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    tasks = (joblib.delayed(_collect_scene)(folder, i, n_plans, estimator) for i in scenes)
+    found = joblib.Parallel(n_jobs=n_jobs, verbose=5)(tasks)
+    return [data for data in found if data is not None]
+
+
+def random_scene(i: int) -> Scene:
+    """Return one of the random scenes that data come from."""
+    return random_rope_scene(np.random.SeedSequence([RANDOM_SCENE_SEED, i]))
+
+
+def _collect_scene(folder: Path, i: int, n_plans: int, estimator: Any) -> SceneData | None:
+    kind = Rope if estimator is None else RopeFromItsStart
+    rope = kind(random_scene(i), features="curtain")
+    file, empty = folder / f"scene-{i:04d}.npz", folder / f"scene-{i:04d}.empty"
+    if empty.exists():
+        return None
+    if not file.exists():
+        planner = BiasedRRT(rope, estimator, k=K, max_iterations=RANDOM_ITERATIONS)
+        seed = np.random.SeedSequence([RANDOM_SCENE_SEED, 1, i])
+        try:
+            collect_transitions(rope, planner, n_plans, random_state=seed).save(file)
+        except ValueError:  # no room for a rope, or no way through
+            empty.touch()
+            return None
+    return SceneData(rope.scene, Transitions.load(file))
+
+
+def described(parts: Sequence[SceneData], kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the features, labels and plans of all parts; plan ids differ between scenes."""
+    rows, labels, plans, first = [], [], [], 0
+    for part in parts:
+        rows.append(part.transitions.features(Rope(part.scene, features=kind)))
+        labels.append(part.transitions.y)
+        plans.append(part.transitions.plan + first)
+        first = int(plans[-1].max()) + 1
+    return np.concatenate(rows), np.concatenate(labels), np.concatenate(plans)
