@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,8 +22,9 @@ ARRIVED = 1e-9
 class LockstepRRT:
     """An RRT that extends a few branches at once, one transition each per question.
 
-    A branch grows towards its sample until it arrives or a transition is rejected; then another
-    sample takes its place.
+    A branch grows towards its sample until it arrives or a transition is rejected. Then another
+    sample takes its place; or else, for a tenth of the branches, a goal, from where it ended.
+    Growing towards goals from whichever state is nearest would fail again and again in one place.
 
     Parameters
     ----------
@@ -51,19 +54,18 @@ class LockstepRRT:
         self._rng = rng
         self._commands: list[Array] = []
         self._last = 0
+        self._goal_tried: set[int] = set()
 
     def __call__(self, clock: Clock) -> Array | None:
         """Search until a state is a goal; return the configurations, None when time is up."""
         found = bool(self._system.goal_reached(self.tree.reduced, self._goals)[0])
-        targets, tips = self._goals[:0], np.arange(0)
+        growing = _Branches(self._goals[:0], np.arange(0), np.zeros(0, dtype=np.bool_))
+        ended = growing.tips
         while not found:
-            n_idle = EXTENSIONS_PER_ROUND - len(targets)
+            n_idle = EXTENSIONS_PER_ROUND - len(growing.tips)
             if clock.spent(n_idle):
                 return None
-            samples = self._sample(n_idle)
-            targets = np.concatenate([targets, samples])
-            tips = np.concatenate([tips, self.tree.nearest(samples)])
-            found, targets, tips = self._step(targets, tips)
+            found, growing, ended = self._step(growing.and_also(self._start(n_idle, ended)))
         return self.path()[0][:, : self._system.configuration_dim]
 
     def path(self) -> tuple[Array, Array]:
@@ -76,18 +78,26 @@ class LockstepRRT:
         start = self.tree.reduced[:1]
         return self._system.steer(start, start[:, : self._system.configuration_dim])[:0]
 
-    def _sample(self, n: int) -> Array:
-        samples = self._system.sample_configurations(self._rng, n)
-        to_goal = self._rng.random(n) < GOAL_BIAS
-        chosen = self._rng.integers(len(self._goals), size=int(to_goal.sum()))
-        samples[to_goal] = self._goals[chosen]
-        return samples
+    def _start(self, n: int, ended: NDArray[np.int64]) -> _Branches:
+        """Start branches, some towards a goal from where others ended."""
+        fresh = np.array([tip for tip in ended if tip not in self._goal_tried], dtype=np.int64)
+        from_tips = fresh[self._rng.random(len(fresh)) < GOAL_BIAS]
+        self._goal_tried.update(from_tips.tolist())
+        goals = self._goals[self._rng.integers(len(self._goals), size=len(from_tips))]
+        samples = self._system.sample_configurations(self._rng, n - len(from_tips))
+        return _Branches(
+            np.concatenate([goals, samples]),
+            np.concatenate([from_tips, self.tree.nearest(samples)]),
+            np.arange(n) < len(from_tips),
+        )
 
-    def _step(
-        self, targets: Array, tips: NDArray[np.int64]
-    ) -> tuple[bool, Array, NDArray[np.int64]]:
-        """Add one transition to each branch; return whether a goal is met, and who goes on."""
-        system = self._system
+    def _step(self, growing: _Branches) -> tuple[bool, _Branches, NDArray[np.int64]]:
+        """Add one transition to each branch.
+
+        Returns whether a goal is met, the branches that go on, and the tips of those that ended
+        on their way to a sample.
+        """
+        system, targets, tips = self._system, growing.targets, growing.tips
         reduced = self.tree.reduced[tips]
         command = system.steer(reduced, targets)
         following, valid = system.propagate(reduced, command)
@@ -101,5 +111,29 @@ class LockstepRRT:
             self._last = int(added[np.argmax(reached)])
         configurations = following[accepted, : system.configuration_dim]
         left = shortest_way(configurations, targets[accepted], system.angular)
-        going_on = (np.abs(left) > ARRIVED * system.step_size).any(axis=1)
-        return bool(reached.any()), targets[accepted[going_on]], added[going_on]
+        going_on = np.zeros(len(tips), dtype=np.bool_)
+        going_on[accepted] = (np.abs(left) > ARRIVED * system.step_size).any(axis=1)
+        new_tips = tips.copy()
+        new_tips[accepted] = added
+        grown = _Branches(targets, new_tips, growing.to_goal)
+        ended = new_tips[~going_on & ~growing.to_goal]
+        return bool(reached.any()), grown.only(going_on), ended
+
+
+@dataclass(frozen=True)
+class _Branches:
+    """Branches that grow: what towards, from which states, and whether towards a goal."""
+
+    targets: Array
+    tips: NDArray[np.int64]
+    to_goal: NDArray[np.bool_]
+
+    def only(self, which: NDArray[np.bool_]) -> _Branches:
+        return _Branches(self.targets[which], self.tips[which], self.to_goal[which])
+
+    def and_also(self, others: _Branches) -> _Branches:
+        return _Branches(
+            np.concatenate([self.targets, others.targets]),
+            np.concatenate([self.tips, others.tips]),
+            np.concatenate([self.to_goal, others.to_goal]),
+        )
