@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.check_transition import CheckTransition
+from planners.check_transition import CheckTransition, doubts
 from systems.angles import shortest_way
 from systems.system import Array, System
 
@@ -44,8 +44,9 @@ class CarriedShortcuts:
 
     A shortcut is taken if g allows every transition of it and of the plan's rest, the plan still
     ends in a goal, and every transition that is not bit by bit one of the old plan's is
-    classified Reliable. Nothing is drawn: a shortcut that is tried again and again until a draw
-    lets it pass would undo the bias.
+    classified Reliable; and if together they are as likely to go well as those that they
+    replace. Nothing is drawn: a shortcut that is tried again and again until a draw lets it pass
+    would undo the bias.
 
     Parameters
     ----------
@@ -77,13 +78,15 @@ class CarriedShortcuts:
         shortened : Path
             From the same start, in no more transitions.
         """
+        doubted = doubts(self._check.probability(path.reduced[:-1], path.reduced[1:]))
         for _ in range(ROUNDS):
             if len(path.commands) < 2:
                 break
             first, last = self._propose(len(path.reduced))
             way = self._shorter_way(path.reduced[first : last + 1, : self._dim], self._draw_part())
             if way is not None:
-                path = self._with_shortcut(path, first, last, way) or path
+                better = self._with_shortcut(path, doubted, first, last, way)
+                path, doubted = better or (path, doubted)
         return path
 
     def _propose(self, n_states: int) -> tuple[int, int]:
@@ -113,26 +116,33 @@ class CarriedShortcuts:
         n_steps = max(1, int(np.ceil(travelled / self._system.step_size - ARRIVED)))
         return _resampled(straight, n_steps) if n_steps <= len(moves) else None
 
-    def _with_shortcut(self, path: Path, first: int, last: int, way: Array) -> Path | None:
-        """Return the plan with one shortcut, or None where that may not be taken."""
+    def _with_shortcut(
+        self, path: Path, doubted: Array, first: int, last: int, way: Array
+    ) -> tuple[Path, Array] | None:
+        """Return the plan with one shortcut, and its doubts, or None where that may not be."""
         shortcut = self._go(path.reduced[first], way)
-        if shortcut is None or not self._all_reliable(shortcut):
+        if shortcut is None:
+            return None
+        on_shortcut = self._doubts_if_reliable(shortcut)
+        if on_shortcut is None:
             return None
         rest = self._follow(shortcut.reduced[-1], path, last)
         if rest is None:
             return None
         followed, n_followed = rest
-        if not self._all_reliable(followed):
-            return None
+        on_rest = self._doubts_if_reliable(followed)
         kept = last + n_followed
+        if on_rest is None or on_shortcut.sum() + on_rest.sum() > doubted[first:kept].sum():
+            return None
         reduced = [path.reduced[:first], shortcut.reduced, followed.reduced[1:]]
         commands = [path.commands[:first], shortcut.commands, followed.commands]
         joined = Path(
             np.concatenate([*reduced, path.reduced[kept + 1 :]]),
             np.concatenate([*commands, path.commands[kept:]]),
         )
-        arrives = self._system.goal_reached(joined.reduced[-1:], self._goals)[0]
-        return joined if arrives else None
+        if not self._system.goal_reached(joined.reduced[-1:], self._goals)[0]:
+            return None
+        return joined, np.concatenate([doubted[:first], on_shortcut, on_rest, doubted[kept:]])
 
     def _go(self, start: Array, way: Array) -> Path | None:
         """Go from one configuration to the next; None where that is not allowed."""
@@ -174,13 +184,17 @@ class CarriedShortcuts:
         gap = np.abs(shortest_way(state[: self._dim], target, self._system.angular)).max()
         return bool(gap <= ARRIVED * self._system.step_size)
 
-    def _all_reliable(self, path: Path) -> bool:
+    def _doubts_if_reliable(self, path: Path) -> Array | None:
+        """Return each transition's doubt, or None if one is not classified Reliable."""
         before, after = path.reduced[:-1], path.reduced[1:]
+        doubted = np.zeros(len(before))
         for i in range(0, len(before), CLASSIFIED_AT_ONCE):
             part = slice(i, i + CLASSIFIED_AT_ONCE)
-            if not self._check.classify(before[part], after[part]).all():
-                return False
-        return True
+            reliable, probability = self._check.appraise(before[part], after[part])
+            if not reliable.all():
+                return None
+            doubted[part] = doubts(probability)
+        return doubted
 
 
 def _ratios(moves: Array) -> Array:

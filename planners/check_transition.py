@@ -147,6 +147,11 @@ class CheckTransition:
         return predicted == self._estimator.classes_[self._reliable_column]
 
 
+def doubts(probability: Array) -> Array:
+    """Return -log of the probability that a transition is Reliable; doubts of a plan add up."""
+    return -np.log(np.maximum(probability, 1e-12))
+
+
 def _checked_classes(estimator: Any) -> list[Any]:
     if not hasattr(estimator, "predict"):
         raise ValueError(f"estimator must have the method predict, got {estimator!r}.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.check_transition import CheckTransition
+from planners.check_transition import CheckTransition, doubts
 from planners.edges import split_edges
 from systems.system import Array, System
 
@@ -60,12 +60,12 @@ class EdgeChecker:
         possible, origins, following, edge = self._propagate(starts, ends)
         reliable, probability = self._check.appraise(origins, following)
         doubt = np.zeros(len(starts))
-        np.add.at(doubt, edge, _doubts(probability))
+        np.add.at(doubt, edge, doubts(probability))
         return _all_per_edge(possible, edge, reliable), doubt
 
     def doubts(self, reduced: Array, next_reduced: Array) -> Array:
         """Return -log of the probability that each transition is Reliable, shape (n,)."""
-        return _doubts(self._check.probability(reduced, next_reduced))
+        return doubts(self._check.probability(reduced, next_reduced))
 
     def _propagate(
         self, starts: Array, ends: Array
@@ -81,10 +81,6 @@ class EdgeChecker:
             kept = possible[edge]
             origins, following, edge = origins[kept], following[kept], edge[kept]
         return possible, origins, following, edge
-
-
-def _doubts(probability: Array) -> Array:
-    return -np.log(np.maximum(probability, 1e-12))
 
 
 def _all_per_edge(
