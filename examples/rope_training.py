@@ -22,7 +22,7 @@ from rope_collection import (
 from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.model_selection import GroupShuffleSplit, ShuffleSplit
 
-from reliability import TransitionReliabilityClassifier
+from reliability import TransitionReliabilityClassifier, __version__
 from systems.rope_curtain import mirrored, reversed_ends
 
 TRAINING_SEED = 0
@@ -30,7 +30,7 @@ HELD_OUT = 0.1
 # Scenes and plans per scene. The first round is planned without a classifier and from starts
 # all over the scenes, the others with what the rounds before have taught.
 ROUNDS = ((range(250), 4), (range(400, 465), 3), (range(500, 640), 3))
-PACKAGES = ("numpy", "scikit-learn", "skorch", "torch", "mujoco", "transition-reliability")
+PACKAGES = ("numpy", "scikit-learn", "skorch", "torch", "mujoco")
 
 
 def train_all(folder: Path, models: Path, n_jobs: int) -> None:
@@ -172,7 +172,7 @@ def provenance(
         "transitions": sum(len(part.transitions) for part in parts),
         "accuracy by transition": by_transition,
         "accuracy by plan": by_plan,
-        "versions": {name: version(name) for name in PACKAGES},
+        "versions": {name: version(name) for name in PACKAGES} | {"this library": __version__},
     }
 
 
