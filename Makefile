@@ -1,10 +1,13 @@
-# Verbs: arm, test, check, bench, env, clean.
+# Verbs: arm, car, test, check, bench, env, clean.
 PYTHON ?= python3.11
 ENV := .venv
 RUN := $(ENV)/bin/python
 
 arm: $(ENV)/ready ## no data to the arm's table and pictures, in build/arm
 	$(RUN) examples/arm.py
+
+car: $(ENV)/ready ## no data to the car's tables and pictures, in build/car
+	$(RUN) examples/car.py
 
 test: $(ENV)/ready check ## style, types and tests
 	$(RUN) -m pytest
@@ -27,4 +30,4 @@ $(ENV)/ready: setup.cfg pyproject.toml constraints.txt
 clean:
 	rm -rf $(ENV) build *.egg-info
 
-.PHONY: arm test check bench env clean
+.PHONY: arm car test check bench env clean

@@ -30,12 +30,11 @@ DEMO_SEED = 31
 SECONDS_PER_FRAME = 0.2
 
 
-def draw_all(classifier: Any, noise: Noise, out: Path) -> None:
-    """Save all pictures."""
+def draw_all(classifier: Any, out: Path, n_tries: int) -> None:
+    """Save the pictures of the paper's example, and of one query in a random scene."""
     draw_fan(classifier, out / "fan.png")
     draw_speeds(out / "speeds.png")
-    draw_calibration(noise, out / "calibration.png")
-    scene, problem, plans = find_demonstration(classifier)
+    scene, problem, plans = find_demonstration(classifier, n_tries)
     draw_trees(scene, problem, plans, out / "trees.png")
     animate(scene, problem, plans, out / "executions.gif")
 
@@ -111,13 +110,15 @@ def draw_calibration(noise: Noise, path: Path) -> None:
     plt.close(figure)
 
 
-def find_demonstration(classifier: Any) -> tuple[CarScene, Problem, dict[str, PlanResult]]:
+def find_demonstration(
+    classifier: Any, n_tries: int
+) -> tuple[CarScene, Problem, dict[str, PlanResult]]:
     """Find a query on which the car drives far with the classifier and crashes without."""
-    for i in range(200):
+    for i in range(n_tries):
         scene = random_car_scene(np.random.SeedSequence([DEMO_SEED, i]))
         car = Car(scene)
         problem = car.sample_problem(np.random.SeedSequence([DEMO_SEED, i, 1]))
-        if np.linalg.norm(problem.goal[0, :2] - problem.start[:2]) < 4:
+        if np.linalg.norm(problem.goal[0, :2] - problem.start[:2]) < 4 and i + 1 < n_tries:
             continue
         plans = {name: plan_query(name, scene, classifier, problem, i) for name in ("none", "ours")}
         ends = [car.rollout(problem.start, plan.commands) for plan in plans.values()]
