@@ -29,7 +29,7 @@ SPEED_POSE, SPEED_COMMAND = (0.3, 0.0, 0.0), (0.45, -0.2, -0.85)
 SPEEDS = (0.5, 1.75, 2.0)
 FAN_POSE, TURN_OF_FAN = np.array([0.3, 0.0, 0.0]), 0.6
 DEMO_SEED = 31
-SECONDS_PER_FRAME = 0.2
+SECONDS_PER_FRAME = 0.3
 
 
 def draw_all(classifier: Any, out: Path, n_tries: int) -> None:
@@ -150,7 +150,7 @@ def draw_trees(scene: CarScene, problem: Problem, plans: dict[str, PlanResult], 
             axis.plot(*np.transpose([one, other]), color="tab:blue", linewidth=0.5, alpha=0.5)
         axis.plot(*plan.reduced[:, :2].T, color="black", linestyle="--", label="plan")
         axis.plot(*trace[:, :2].T, color="tab:orange", linewidth=2, label="execution")
-        _draw_car(axis, trace[-1], "tab:orange")
+        _draw_car(axis, trace[-1], _outcome(scene, problem, trace[-1]))
         axis.set_title(_title(name))
         axis.legend(loc="upper right", fontsize=8)
     figure.savefig(path, dpi=80)
@@ -173,13 +173,18 @@ def animate(scene: CarScene, problem: Problem, plans: dict[str, PlanResult], pat
             axis.plot(*plan.reduced[:, :2].T, color="black", linestyle="--", linewidth=0.8)
             shown = states[: frame + 1]
             axis.plot(*shown[:, :2].T, color="tab:orange", linewidth=2)
-            _draw_car(axis, shown[-1], "tab:orange")
+            ended = len(shown) == len(states)
+            _draw_car(axis, shown[-1], _outcome(scene, problem, shown[-1]) if ended else "black")
             axis.set_title(_title(name), fontsize=10)
         return []
 
     animation = FuncAnimation(figure, draw, frames=n_frames)
-    animation.save(path, PillowWriter(fps=round(2 / SECONDS_PER_FRAME)), dpi=70)
+    animation.save(path, PillowWriter(fps=round(2 / SECONDS_PER_FRAME)), dpi=64)
     plt.close(figure)
+
+
+def _outcome(scene: CarScene, problem: Problem, state: np.ndarray) -> str:
+    return GREEN if Car(scene).succeeded(state, problem.goal, BETA) else RED
 
 
 def _title(name: str) -> str:
@@ -188,7 +193,7 @@ def _title(name: str) -> str:
 
 def _draw_query(axis: Axes, scene: CarScene, problem: Problem) -> None:
     _draw_scene(axis, scene)
-    _draw_car(axis, problem.start, "black")
+    _draw_car(axis, problem.start, "tab:gray")
     _draw_car(axis, problem.goal[0], GREEN, dashed=True)
 
 
