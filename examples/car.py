@@ -39,7 +39,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--scenes", type=int, default=50, help="training scenes per round")
     parser.add_argument("--plans", type=int, default=30, help="plans per scene and round")
     parser.add_argument("--rounds", type=int, default=4, help="rounds of collecting")
-    parser.add_argument("--test-scenes", type=int, default=30, help="scenes to test in")
+    parser.add_argument("--test-scenes", type=int, default=20, help="scenes to test in")
     parser.add_argument("--queries", type=int, default=10, help="queries per test scene")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
     parser.add_argument("--model", type=Path, help="an earlier run's car.joblib, to learn nothing")
