@@ -1,4 +1,4 @@
-# Verbs: arm, rope, test, check, bench, env, clean.
+# Verbs: arm, rope, car, test, check, bench, env, clean.
 PYTHON ?= python3.11
 ENV := .venv
 RUN := $(ENV)/bin/python
@@ -8,6 +8,9 @@ arm: $(ENV)/ready ## no data to the arm's table and pictures, in build/arm
 
 rope: $(ENV)/ready ## a rope that gets caught and one that does not, in build/rope
 	$(RUN) examples/rope.py
+
+car: $(ENV)/ready ## no data to the car's tables and pictures, in build/car
+	$(RUN) examples/car.py
 
 test: $(ENV)/ready check ## style, types and tests
 	$(RUN) -m pytest
@@ -30,4 +33,4 @@ $(ENV)/ready: setup.cfg pyproject.toml constraints.txt
 clean:
 	rm -rf $(ENV) build *.egg-info
 
-.PHONY: arm rope test check bench env clean
+.PHONY: arm rope car test check bench env clean

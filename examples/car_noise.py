@@ -6,17 +6,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from car_collection import training_scene
 from car_planners import careful_planner
 from sklearn.calibration import CalibratedClassifierCV
 from sklearn.frozen import FrozenEstimator
 
-from systems import Car, CarScene
+from systems import Car, CarScene, random_car_scene
 
 MOTION_SEED, GRID_SEED, CALIBRATION_SEED = 21, 22, 23
-N_MOTION_SCENES, PLANS_PER_SCENE = 20, 10
+MOST_MOTION_SCENES, PLANS_PER_SCENE = 20, 10
 POSES_PER_SCENE, N_SPEEDS = 10, 64
-N_CALIBRATION_SCENES = 60
+MOST_CALIBRATION_SCENES = 60
 LENGTH = 0.75
 N_BINS = 10
 
@@ -66,17 +65,18 @@ def to_scene_frame(pose: np.ndarray, commands: np.ndarray) -> np.ndarray:
     return turned
 
 
-def measure_noise(classifier: Any, unseen: list[CarScene]) -> Noise:
+def measure_noise(classifier: Any, unseen: list[CarScene], n_scenes: int) -> Noise:
     """Compare the classifier's probabilities with the shares of speeds, in scenes new to both.
 
     Speeds and steering angles are those that a car has before a command of a plan made with the
-    classifier. The calibration sees one execution of each transition of such a grid in training
-    scenes.
+    classifier. The calibration sees one execution of each transition of such a grid in scenes of
+    its own, ``n_scenes`` at most.
     """
-    motions = _motions(classifier)
+    motions = _motions(classifier, min(n_scenes, MOST_MOTION_SCENES))
     rng = np.random.default_rng(CALIBRATION_SEED)
     calibration = [
-        _grid(Car(training_scene(0, i)), motions, 1, rng) for i in range(N_CALIBRATION_SCENES)
+        _grid(_calibration_car(i), motions, 1, rng)
+        for i in range(min(n_scenes, MOST_CALIBRATION_SCENES))
     ]
     X, share = (np.concatenate(arrays) for arrays in zip(*calibration, strict=True))
     calibrated = CalibratedClassifierCV(FrozenEstimator(classifier), method="isotonic")
@@ -87,17 +87,21 @@ def measure_noise(classifier: Any, unseen: list[CarScene]) -> Noise:
     return Noise(share, classifier.predict_proba(X)[:, 1], calibrated.predict_proba(X)[:, 1])
 
 
-def _motions(classifier: Any) -> np.ndarray:
+def _calibration_car(i: int) -> Car:
+    return Car(random_car_scene(np.random.SeedSequence([CALIBRATION_SEED, i])))
+
+
+def _motions(classifier: Any, n_scenes: int) -> np.ndarray:
     """Return speeds and steering angles before commands, (n, 2)."""
     found = []
-    for i in range(N_MOTION_SCENES):
-        car = Car(training_scene(0, i))
+    for i in range(n_scenes):
+        car = _calibration_car(i)
         for j in range(PLANS_PER_SCENE):
             seed = np.random.SeedSequence([MOTION_SEED, i, j])
             problem = car.sample_problem(seed)
             plan = careful_planner(car, classifier, j).plan(problem.start[:3], problem.goal)
             states = car.rollout(problem.start, plan.commands).states
-            found.append(states[: len(plan.commands), 3:])
+            found.append(states[: max(1, len(plan.commands)), 3:])
     return np.concatenate(found)
 
 

@@ -10,32 +10,33 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-from car_noise import LENGTH, Noise, bins, to_scene_frame
+from car_noise import Noise, bins
 from car_planners import BETA, plan_query
 from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
 
 from planners import PlanResult
+from reliability import RELIABLE
 from systems import Car, CarScene, Circle, ConvexPolygon, Problem, random_car_scene
 
 GREEN, RED = "tab:green", "tab:red"
 FAN_SCENE = CarScene(
-    (Circle(1.75, 0.95, 0.45), ConvexPolygon(((1.2, -1.6), (2.6, -1.6), (2.6, -0.55)))),
-    (-1.5, -2.0, 3.0, 2.0),
+    (Circle(1.75, 0.5, 0.45), ConvexPolygon(((-1.1, -1.2), (0.0, -1.2), (-0.5, -0.35)))),
+    (-1.2, -1.3, 2.3, 1.3),
 )
-SPEED_SCENE = CarScene((Circle(1.6, 0.2, 0.5),), (-0.5, -1.3, 2.4, 1.0))
-SPEED_POSE, SPEED_COMMAND = (0.3, 0.0, 0.0), (0.75, -0.35, -0.85)
-SPEEDS = (0.3, 1.2, 2.0)
+SPEED_SCENE = CarScene((Circle(1.65, 0.13, 0.5),), (0.0, -0.8, 2.3, 0.8))
+SPEED_POSE, SPEED_COMMAND = (0.3, 0.0, 0.0), (0.45, -0.2, -0.85)
+SPEEDS = (0.5, 1.75, 2.0)
+FAN_POSE, TURN_OF_FAN = np.array([0.3, 0.0, 0.0]), 0.6
 DEMO_SEED = 31
-SECONDS_PER_FRAME = 0.2
+SECONDS_PER_FRAME = 0.3
 
 
-def draw_all(classifier: Any, noise: Noise, out: Path) -> None:
-    """Save all pictures."""
+def draw_all(classifier: Any, out: Path, n_tries: int) -> None:
+    """Save the pictures of the paper's example, and of one query in a random scene."""
     draw_fan(classifier, out / "fan.png")
     draw_speeds(out / "speeds.png")
-    draw_calibration(noise, out / "calibration.png")
-    scene, problem, plans = find_demonstration(classifier)
+    scene, problem, plans = find_demonstration(classifier, n_tries)
     draw_trees(scene, problem, plans, out / "trees.png")
     animate(scene, problem, plans, out / "executions.gif")
 
@@ -43,45 +44,55 @@ def draw_all(classifier: Any, noise: Noise, out: Path) -> None:
 def draw_fan(classifier: Any, path: Path) -> None:
     """Draw what the classifier says of many commands from one pose (the paper's Fig. 3)."""
     car = Car(FAN_SCENE)
-    pose = np.array([[0.3, 0.0, 0.0]])
-    ways = np.linspace(-0.9, 0.9, 13)
-    moves = np.column_stack([LENGTH * np.cos(ways / 2), LENGTH * np.sin(ways / 2), ways])
-    moves = np.vstack([moves, moves * [1.25, 1.25, 1.0] * [1, 1, 0.55], moves * [-1, 1, 1]])
-    moves = moves[np.linalg.norm(moves, axis=1) <= 1.5]
-    commands = to_scene_frame(pose[0], moves)
-    reduced = np.repeat(pose, len(commands), axis=0)
+    commands = _all_around()
+    reduced = np.repeat([FAN_POSE], len(commands), axis=0)
     following, valid = car.propagate(reduced, commands)
-    reliable = classifier.predict(car.features(reduced[valid], following[valid])) == 1
-    figure, axis = plt.subplots(figsize=(5.6, 5.0), layout="constrained")
+    reliable = classifier.predict(car.features(reduced[valid], following[valid])) == RELIABLE
+    figure, axis = plt.subplots(figsize=(5.8, 4.6), layout="constrained")
     _draw_scene(axis, FAN_SCENE)
     for end, good in zip(following[valid], reliable, strict=True):
         color = GREEN if good else RED
-        axis.plot([pose[0, 0], end[0]], [pose[0, 1], end[1]], color=color, linewidth=0.8)
-        _draw_arrow(axis, end, color)
-    _draw_car(axis, pose[0], "black")
-    axis.plot([], [], color=GREEN, marker=">", label="classified Reliable")
-    axis.plot([], [], color=RED, marker=">", label="classified Unreliable")
-    axis.legend(loc="upper left", fontsize=8)
-    axis.set_title("From one b: every straight move is collision-free")
+        axis.plot(*np.transpose([FAN_POSE[:2], end[:2]]), color=color, linewidth=0.7, alpha=0.5)
+        _draw_arrow(axis, end, color, size=0.5)
+    _draw_car(axis, FAN_POSE, "black")
+    axis.plot([], [], color=GREEN, marker=">", label="Reliable")
+    axis.plot([], [], color=RED, marker=">", label="Unreliable")
+    axis.legend(loc="upper left", fontsize=9, framealpha=1)
+    axis.set_title("Commands from one pose; no straight way touches anything", fontsize=10)
     figure.savefig(path, dpi=90)
     plt.close(figure)
+
+
+def _all_around() -> np.ndarray:
+    """Return displacements in all directions, turned as on a circle where that can be driven."""
+    bearing = np.arange(-np.pi, np.pi, np.pi / 24)
+    turn = np.clip(2 * np.arctan(np.tan(bearing)), -TURN_OF_FAN, TURN_OF_FAN)
+    rows = [
+        np.column_stack([length * np.cos(bearing), length * np.sin(bearing), turn])
+        for length in (0.5, 0.8)
+    ]
+    return np.concatenate(rows)
 
 
 def draw_speeds(path: Path) -> None:
     """Draw one command executed from one pose at three speeds (the paper's Fig. 4)."""
     car = Car(SPEED_SCENE)
-    figure, axes = plt.subplots(1, 3, figsize=(9.6, 3.2), layout="constrained")
+    predicted = np.add(SPEED_POSE, SPEED_COMMAND)
+    figure, axes = plt.subplots(1, 3, figsize=(9.0, 2.7), layout="constrained")
     for axis, speed in zip(axes, SPEEDS, strict=True):
-        trace = car.trace([*SPEED_POSE, speed, 0.0], [SPEED_COMMAND])
-        reached = car.execute([[*SPEED_POSE, speed, 0.0]], [SPEED_COMMAND])[1][0]
+        start = [*SPEED_POSE, speed, 0.0]
+        trace = car.trace(start, [SPEED_COMMAND])
+        completed = car.execute([start], [SPEED_COMMAND])[1][0]
+        close = car.close(predicted[None], trace[-1:, :3])[0]
+        color, outcome = (GREEN, "arrives") if close else ("tab:orange", "swings wide")
+        if not completed:
+            color, outcome = RED, "hits the obstacle"
         _draw_scene(axis, SPEED_SCENE)
         _draw_car(axis, np.array(SPEED_POSE), "black")
-        _draw_car(axis, np.add(SPEED_POSE, SPEED_COMMAND), "tab:gray", dashed=True)
-        color = GREEN if reached else RED
+        _draw_car(axis, predicted, "tab:gray", dashed=True)
         axis.plot(*trace[:, :2].T, color=color, linewidth=2)
         _draw_car(axis, trace[-1], color)
-        axis.set_title(f"{speed} m/s: " + ("arrives" if reached else "hits the obstacle"))
-    figure.suptitle("Same b, same u; dashed: g(b, u)")
+        axis.set_title(f"{speed} m/s: {outcome}", fontsize=10)
     figure.savefig(path, dpi=90)
     plt.close(figure)
 
@@ -111,13 +122,15 @@ def draw_calibration(noise: Noise, path: Path) -> None:
     plt.close(figure)
 
 
-def find_demonstration(classifier: Any) -> tuple[CarScene, Problem, dict[str, PlanResult]]:
+def find_demonstration(
+    classifier: Any, n_tries: int
+) -> tuple[CarScene, Problem, dict[str, PlanResult]]:
     """Find a query on which the car drives far with the classifier and crashes without."""
-    for i in range(200):
+    for i in range(n_tries):
         scene = random_car_scene(np.random.SeedSequence([DEMO_SEED, i]))
         car = Car(scene)
         problem = car.sample_problem(np.random.SeedSequence([DEMO_SEED, i, 1]))
-        if np.linalg.norm(problem.goal[0, :2] - problem.start[:2]) < 4:
+        if np.linalg.norm(problem.goal[0, :2] - problem.start[:2]) < 4 and i + 1 < n_tries:
             continue
         plans = {name: plan_query(name, scene, classifier, problem, i) for name in ("none", "ours")}
         ends = [car.rollout(problem.start, plan.commands) for plan in plans.values()]
@@ -137,7 +150,7 @@ def draw_trees(scene: CarScene, problem: Problem, plans: dict[str, PlanResult], 
             axis.plot(*np.transpose([one, other]), color="tab:blue", linewidth=0.5, alpha=0.5)
         axis.plot(*plan.reduced[:, :2].T, color="black", linestyle="--", label="plan")
         axis.plot(*trace[:, :2].T, color="tab:orange", linewidth=2, label="execution")
-        _draw_car(axis, trace[-1], "tab:orange")
+        _draw_car(axis, trace[-1], _outcome(scene, problem, trace[-1]))
         axis.set_title(_title(name))
         axis.legend(loc="upper right", fontsize=8)
     figure.savefig(path, dpi=80)
@@ -160,13 +173,18 @@ def animate(scene: CarScene, problem: Problem, plans: dict[str, PlanResult], pat
             axis.plot(*plan.reduced[:, :2].T, color="black", linestyle="--", linewidth=0.8)
             shown = states[: frame + 1]
             axis.plot(*shown[:, :2].T, color="tab:orange", linewidth=2)
-            _draw_car(axis, shown[-1], "tab:orange")
+            ended = len(shown) == len(states)
+            _draw_car(axis, shown[-1], _outcome(scene, problem, shown[-1]) if ended else "black")
             axis.set_title(_title(name), fontsize=10)
         return []
 
     animation = FuncAnimation(figure, draw, frames=n_frames)
-    animation.save(path, PillowWriter(fps=round(2 / SECONDS_PER_FRAME)), dpi=70)
+    animation.save(path, PillowWriter(fps=round(2 / SECONDS_PER_FRAME)), dpi=64)
     plt.close(figure)
+
+
+def _outcome(scene: CarScene, problem: Problem, state: np.ndarray) -> str:
+    return GREEN if Car(scene).succeeded(state, problem.goal, BETA) else RED
 
 
 def _title(name: str) -> str:
@@ -175,7 +193,7 @@ def _title(name: str) -> str:
 
 def _draw_query(axis: Axes, scene: CarScene, problem: Problem) -> None:
     _draw_scene(axis, scene)
-    _draw_car(axis, problem.start, "black")
+    _draw_car(axis, problem.start, "tab:gray")
     _draw_car(axis, problem.goal[0], GREEN, dashed=True)
 
 
@@ -196,11 +214,12 @@ def _draw_car(axis: Axes, pose: np.ndarray, color: str, dashed: bool = False) ->
     _draw_arrow(axis, pose, color)
 
 
-def _draw_arrow(axis: Axes, pose: np.ndarray, color: str) -> None:
+def _draw_arrow(axis: Axes, pose: np.ndarray, color: str, size: float = 1.0) -> None:
     heading = np.array([np.cos(pose[2]), np.sin(pose[2])])
     left = np.array([-heading[1], heading[0]])
-    tip, tail = pose[:2] + 0.3 * heading, pose[:2] + 0.1 * heading
-    axis.add_patch(plt.Polygon([tip, tail + 0.08 * left, tail - 0.08 * left], color=color))
+    tail = pose[:2] + 0.1 * heading * (size == 1)
+    corners = [tail + 0.2 * size * heading, tail + 0.08 * size * left, tail - 0.08 * size * left]
+    axis.add_patch(plt.Polygon(corners, color=color, linewidth=0))
 
 
 def _outline(pose: np.ndarray) -> np.ndarray:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from car_waypoints import move_waypoints
 
 from planners import BiasedRRT, BiasedRRTConnect, PlanResult
 from systems import Car, CarScene, Problem
 from systems.angles import shortest_way
 
-PLANNERS = ("none", "ours", "ceiling")
+PLANNERS = ("none", "classifier", "waypoints moved", "ours", "ceiling")
 BETA = 0.3
+ITERATIONS = 8000
+# Of a plan's transitions together; a plan that promises less is made again, a few times.
+PROMISE = 0.6
+MOST_PLANS = 4
 MOST_STRAYED = 0.3
 
 
@@ -50,14 +56,41 @@ def plan_query(
 ) -> PlanResult:
     """Plan with one of the planners of the comparison."""
     if name == "ceiling":
-        planner = BiasedRRT(TrueCar(scene), random_state=seed)
+        planner = BiasedRRT(TrueCar(scene), simplify=False, random_state=seed)
         return planner.plan(problem.start, problem.goal)
     car = Car(scene)
     if name == "none":
         planner = BiasedRRTConnect(car, random_state=seed)
-    else:
-        planner = careful_planner(car, classifier, seed)
-    return planner.plan(car.reduce(problem.start), problem.goal)
+        return planner.plan(car.reduce(problem.start), problem.goal)
+    if name == "classifier":
+        return careful_planner(car, classifier, seed).plan(car.reduce(problem.start), problem.goal)
+    if name == "waypoints moved":
+        return careful_plan(car, classifier, problem, seed)
+    return promising_plan(car, classifier, problem, seed)
+
+
+def promising_plan(car: Car, classifier: Any, problem: Problem, seed: int) -> PlanResult:
+    """Plan until a plan is likely enough to go well, and keep the likeliest."""
+    plans: list[PlanResult] = []
+    while len(plans) < MOST_PLANS and max(map(promise, plans), default=0) < PROMISE:
+        plans.append(careful_plan(car, classifier, problem, MOST_PLANS * seed + len(plans)))
+    return replace(
+        max(plans, key=promise),
+        planning_time=sum(plan.planning_time for plan in plans),
+        simplification_time=sum(plan.simplification_time for plan in plans),
+        n_checked=sum(plan.n_checked for plan in plans),
+    )
+
+
+def promise(plan: PlanResult) -> float:
+    """Return the probability, after the classifier, that all of a plan goes well."""
+    return float(plan.reliability.prod()) if plan.success else 0.0
+
+
+def careful_plan(car: Car, classifier: Any, problem: Problem, seed: int) -> PlanResult:
+    """Plan once, and move the waypoints to where the plan is more likely to go well."""
+    plan = careful_planner(car, classifier, seed).plan(car.reduce(problem.start), problem.goal)
+    return move_waypoints(car, classifier, plan, seed)
 
 
 def careful_planner(car: Car, classifier: Any, seed: int | None = None) -> BiasedRRTConnect:
@@ -65,7 +98,14 @@ def careful_planner(car: Car, classifier: Any, seed: int | None = None) -> Biase
 
     A car can't drive straight towards most poses, so that long edges would hardly ever pass.
     """
-    return BiasedRRTConnect(car, classifier, k=np.inf, transitions_per_edge=1, random_state=seed)
+    return BiasedRRTConnect(
+        car,
+        classifier,
+        k=np.inf,
+        transitions_per_edge=1,
+        max_iterations=ITERATIONS,
+        random_state=seed,
+    )
 
 
 def execute(scene: CarScene, problem: Problem, result: PlanResult) -> dict[str, float]:

@@ -4,6 +4,8 @@ import ast
 import doctest
 import importlib
 import re
+import sys
+import types
 from pathlib import Path
 
 import pytest
@@ -30,6 +32,22 @@ def test_the_readmes_example_runs(tmp_path, monkeypatch, capsys):
     exec(compile(code.replace("6000", "60"), "README.md", "exec"), {})
     assert "The plan reaches the goal." in capsys.readouterr().out
     assert (tmp_path / "arm.joblib").exists()
+
+
+def test_the_readmes_own_system_runs_as_written(capsys):
+    readme = (ROOT / "README.md").read_text()
+    code = re.search(r"## Your own system\n.*?```python\n(.*?)```", readme, flags=re.S)[1]
+    system = code[code.index("class ") : code.index("\n\n\n", code.index("class "))]
+    assert len(system.splitlines()) < 60
+    assert " 1000," in code
+    # A class of no module can't be pickled, which check_system demands.
+    module = types.ModuleType("own_system")
+    sys.modules[module.__name__] = module
+    try:
+        exec(compile(code.replace(" 1000,", " 150,"), "README.md", "exec"), vars(module))
+    finally:
+        del sys.modules[module.__name__]
+    assert capsys.readouterr().out.count("The plan reaches the goal.") == 2
 
 
 @pytest.mark.parametrize("package", ROAD)

@@ -39,6 +39,21 @@ def test_arm_example_gives_its_table_and_pictures(tmp_path):
     assert tables[0] == tables[1], "the same seeds, the same models"
 
 
+def test_car_example_gives_its_tables_and_pictures(tmp_path):
+    out = tmp_path / "out"
+    size = ("--scenes", 3, "--plans", 5, "--rounds", 2, "--test-scenes", 1, "--queries", 1)
+    shown = run(ROOT / "examples" / "car.py", *size, "--jobs", 1, "--out", out, cwd=tmp_path)
+    assert "Round 1:" in shown
+    assert "Best accuracy that any classifier of b, u and E can have here" in shown
+    assert "Random scenes: success is within 0.3" in shown
+    results = json.loads((out / "results.json").read_text())
+    for planners in results.values():
+        assert list(planners) == ["none", "classifier", "waypoints moved", "ours", "ceiling"]
+    assert [len(rows) for rows in results["Random scenes"].values()] == [1] * 5
+    for name in ("fan.png", "speeds.png", "trees.png", "executions.gif", "calibration.png"):
+        assert 5_000 < (out / name).stat().st_size < 300_000
+
+
 def test_rope_example_shows_a_rope_that_got_caught_and_one_that_did_not(tmp_path):
     options = ("simple_hook_short", "--size", 160, 120, "--plans", 8, "--out", tmp_path)
     shown = run(ROOT / "examples" / "rope.py", *options, cwd=tmp_path)
