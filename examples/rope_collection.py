@@ -17,7 +17,7 @@ from systems.validation import RandomState
 
 PAPER_SEED = 2020
 RANDOM_SCENE_SEED = 2021
-N_PAPER_PLANS = 4190
+N_PLANS = 1500
 PAPER_ITERATIONS = 10**5
 # A random scene may have no way through: giving up costs as much as a few plans.
 RANDOM_ITERATIONS = 8000

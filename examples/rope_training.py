@@ -11,7 +11,7 @@ from typing import Any
 import joblib
 import numpy as np
 from rope_collection import (
-    N_PAPER_PLANS,
+    N_PLANS,
     PAPER_SEED,
     RANDOM_SCENE_SEED,
     SceneData,
@@ -45,7 +45,7 @@ def train_all(folder: Path, models: Path, n_jobs: int) -> None:
     n_jobs : int
         Processes that collect.
     """
-    simple_hook = collect_simple_hook(folder, N_PAPER_PLANS, n_jobs)
+    simple_hook = collect_simple_hook(folder, N_PLANS, n_jobs)
     save(train_vector(simple_hook), models / "rope_vector.joblib")
     save(train_ours(simple_hook, folder, n_jobs), models / "rope_ours.joblib")
     save(train_paper(simple_hook, folder / "voxnet.checkpoint"), models / "rope_paper.joblib")
