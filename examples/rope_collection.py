@@ -55,8 +55,18 @@ class RopeFromItsStart(Rope):
         return self.scene_problem()
 
 
+@dataclass(frozen=True)
+class Round:
+    """Which random scenes to plan in, how often, where from, and whether with a classifier."""
+
+    scenes: range
+    n_plans: int
+    from_start: bool
+    biased: bool
+
+
 def collect_random_scenes(
-    folder: Path, scenes: range, n_plans: int, estimator: Any, n_jobs: int
+    folder: Path, plan: Round, estimator: Any, n_jobs: int
 ) -> list[SceneData]:
     """Collect a few plans in each of many random scenes; scenes without any plan are left out.
 
@@ -64,17 +74,13 @@ def collect_random_scenes(
     ----------
     folder : Path
         Holds a file per scene; those that are there are read.
-    scenes : range
-        Numbers of the scenes.
-    n_plans : int
-        Per scene.
+    plan : Round
     estimator : classifier of curtains, or None
-        Biases the planner, which then plans from each scene's own start. Without it, plans are
-        from starts all over the scene.
+        What has been learned so far.
     n_jobs : int
     """
     folder.mkdir(parents=True, exist_ok=True)
-    tasks = (joblib.delayed(_collect_scene)(folder, i, n_plans, estimator) for i in scenes)
+    tasks = (joblib.delayed(_collect_scene)(folder, i, plan, estimator) for i in plan.scenes)
     found = joblib.Parallel(n_jobs=n_jobs, verbose=5)(tasks)
     return [data for data in found if data is not None]
 
@@ -84,17 +90,18 @@ def random_scene(i: int) -> Scene:
     return random_rope_scene(np.random.SeedSequence([RANDOM_SCENE_SEED, i]))
 
 
-def _collect_scene(folder: Path, i: int, n_plans: int, estimator: Any) -> SceneData | None:
-    kind = Rope if estimator is None else RopeFromItsStart
+def _collect_scene(folder: Path, i: int, plan: Round, estimator: Any) -> SceneData | None:
+    kind = RopeFromItsStart if plan.from_start else Rope
     rope = kind(random_scene(i), features="curtain")
     file, empty = folder / f"scene-{i:04d}.npz", folder / f"scene-{i:04d}.empty"
     if empty.exists():
         return None
     if not file.exists():
-        planner = BiasedRRT(rope, estimator, k=K, max_iterations=RANDOM_ITERATIONS)
+        bias = estimator if plan.biased else None
+        planner = BiasedRRT(rope, bias, k=K, max_iterations=RANDOM_ITERATIONS)
         seed = np.random.SeedSequence([RANDOM_SCENE_SEED, 1, i])
         try:
-            collect_transitions(rope, planner, n_plans, random_state=seed).save(file)
+            collect_transitions(rope, planner, plan.n_plans, random_state=seed).save(file)
         except ValueError:  # no room for a rope, or no way through
             empty.touch()
             return None

@@ -14,6 +14,7 @@ from rope_collection import (
     N_PLANS,
     PAPER_SEED,
     RANDOM_SCENE_SEED,
+    Round,
     SceneData,
     collect_random_scenes,
     collect_simple_hook,
@@ -27,9 +28,12 @@ from systems.rope_curtain import mirrored, reversed_ends
 
 TRAINING_SEED = 0
 HELD_OUT = 0.1
-# Scenes and plans per scene. The first round is planned without a classifier and from starts
-# all over the scenes, the others with what the rounds before have taught.
-ROUNDS = ((range(250), 4), (range(400, 465), 3), (range(500, 640), 3))
+ROUNDS = (
+    Round(range(250), 4, from_start=False, biased=False),
+    Round(range(400, 465), 3, from_start=True, biased=True),
+    Round(range(500, 580), 3, from_start=True, biased=True),
+    Round(range(1000, 1140), 3, from_start=True, biased=False),
+)
 PACKAGES = ("numpy", "scikit-learn", "skorch", "torch", "mujoco")
 
 
@@ -112,8 +116,8 @@ def train_vector(simple_hook: SceneData) -> Any:
 def train_ours(simple_hook: SceneData, folder: Path, n_jobs: int) -> Any:
     """Train an MLP on curtains, round by round, and hold out whole plans."""
     parts, classifier = [simple_hook], None
-    for i, (scenes, n_plans) in enumerate(ROUNDS):
-        parts += collect_random_scenes(folder / f"random{i}", scenes, n_plans, classifier, n_jobs)
+    for i, plan in enumerate(ROUNDS):
+        parts += collect_random_scenes(folder / f"random{i}", plan, classifier, n_jobs)
         classifier = fit_curtains(parts, by_plan=True)
     classifier.provenance_ = provenance(
         "curtain",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from systems.validation import RandomState, as_generator
 
 LEAST_LINKS, MOST_LINKS = 25, 70
 WALL_THICKNESS = 0.05
+SHARE_WITH_WALL, SHARE_WITH_SLOT = 0.7, 0.4
 
 _HEIGHT = 0.4
 _HALF_LENGTH = 1.3
@@ -52,14 +54,15 @@ def _draw_scene(rng: np.random.Generator) -> Scene:
         _box((-_HALF_LENGTH, _HALF_LENGTH), hall, (-_HEIGHT - 0.1, -_HEIGHT), "floor")
     ]
     wall_x = float(rng.uniform(-0.6, 0.6))
-    has_wall = rng.random() < 0.7
-    if has_wall:
-        obstacles += _wall(rng, wall_x, half_width)
+    wall = _Wall.drawn(rng, wall_x, half_width) if rng.random() < SHARE_WITH_WALL else None
+    hooks: list[Obstacle] = []
     for i in range(int(rng.integers(1, 5))):
         draw = _HOOKS[rng.integers(len(_HOOKS))]
-        obstacles += draw(rng, wall_x if has_wall else None, half_width, f"{i + 1}")
-    if rng.random() < 0.25:
-        obstacles += _slotted_wall(rng, half_width)
+        hooks += draw(rng, wall_x if wall is not None else None, half_width, f"{i + 1}")
+    slotted = _slotted_wall(rng, half_width) if rng.random() < SHARE_WITH_SLOT else []
+    if wall is not None:
+        obstacles += wall.obstacles(half_width, at_slot=bool(slotted))
+    obstacles += hooks + slotted
     return Scene(
         obstacles=obstacles,
         bounds=np.array([[-_HALF_LENGTH, hall[0], -_HEIGHT], [_HALF_LENGTH, hall[1], _HEIGHT]]),
@@ -70,21 +73,38 @@ def _draw_scene(rng: np.random.Generator) -> Scene:
     )
 
 
-def _wall(rng: np.random.Generator, x: float, half_width: float) -> list[Obstacle]:
-    """Draw a wall across the hall with a slit, either lying or standing."""
-    thick = (x, x + WALL_THICKNESS)
-    opening = float(rng.uniform(0.09, 0.2))
-    if rng.random() < 0.7:
-        z, hall = float(rng.uniform(-0.2, 0.2)), (-half_width, half_width)
+@dataclass(frozen=True)
+class _Wall:
+    """A wall across the hall with a slit, either lying or standing, around a height or a y."""
+
+    x: float
+    opening: float
+    lying: bool
+    place: float
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, x: float, half_width: float) -> _Wall:
+        opening = float(rng.uniform(0.09, 0.2))
+        lying = bool(rng.random() < 0.7)
+        place = rng.uniform(-0.2, 0.2) if lying else rng.uniform(-0.5, 0.5) * half_width
+        return cls(x, opening, lying, float(place))
+
+    def obstacles(self, half_width: float, at_slot: bool) -> list[Obstacle]:
+        thick = (self.x, self.x + WALL_THICKNESS)
+        # A rope that lies in a slot can only pass a slit that meets it.
+        place = 0.0 if at_slot else self.place
+        low, high = place - 0.5 * self.opening, place + 0.5 * self.opening
+        if self.lying or at_slot:
+            hall = (-half_width, half_width)
+            return [
+                _box(thick, hall, (-_HEIGHT, low), "lower wall"),
+                _box(thick, hall, (high, _HEIGHT), "upper wall"),
+            ]
+        tall = (-_HEIGHT, _HEIGHT)
         return [
-            _box(thick, hall, (-_HEIGHT, z - 0.5 * opening), "lower wall"),
-            _box(thick, hall, (z + 0.5 * opening, _HEIGHT), "upper wall"),
+            _box(thick, (-half_width, low), tall, "right wall"),
+            _box(thick, (high, half_width), tall, "left wall"),
         ]
-    y, tall = float(rng.uniform(-0.5, 0.5)) * half_width, (-_HEIGHT, _HEIGHT)
-    return [
-        _box(thick, (-half_width, y - 0.5 * opening), tall, "right wall"),
-        _box(thick, (y + 0.5 * opening, half_width), tall, "left wall"),
-    ]
 
 
 def _slotted_wall(rng: np.random.Generator, half_width: float) -> list[Obstacle]:

@@ -50,6 +50,15 @@ def test_the_readmes_own_system_runs_as_written(capsys):
     assert capsys.readouterr().out.count("The plan reaches the goal.") == 2
 
 
+def test_the_readmes_rope_scene_can_be_learned(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    readme = (ROOT / "README.md").read_text()
+    code = re.search(r"and a model of your own:\n\n```python\n(.*?)```", readme, flags=re.S)[1]
+    assert "BiasedRRT(rope), 200, n_jobs=-1" in code
+    exec(compile(code.replace("200, n_jobs=-1", "8"), "README.md", "exec"), {})
+    assert "The plan reaches the goal." in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("package", ROAD)
 def test_no_import_runs_back_up_the_road(package):
     later = set(ROAD[ROAD.index(package) + 1 :])
