@@ -48,6 +48,17 @@ def fill_margins(rows: Any, bounds: Any, packed: Any, margins: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
+def length_between(grippers: Any, nodes: Any) -> float:
+    """Length from the first gripper along the nodes to the second."""
+    total, x, y, z = 0.0, grippers[0, 0], grippers[0, 1], grippers[0, 2]
+    for i in range(nodes.shape[0] + 1):
+        end = nodes[i] if i < nodes.shape[0] else grippers[1]
+        total += np.sqrt((end[0] - x) ** 2 + (end[1] - y) ** 2 + (end[2] - z) ** 2)
+        x, y, z = end[0], end[1], end[2]
+    return total
+
+
+@njit(cache=True, nogil=True)
 def all_finite(rows: Any) -> bool:
     """Say whether rows hold no NaN and no infinity."""
     for i in range(rows.shape[0]):

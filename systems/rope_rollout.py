@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from systems.distance import signed_distance
 from systems.errors import SimulationDivergedError
 from systems.obstacles import Array, Obstacle
+from systems.rope_kernels import length_between
 from systems.rope_mujoco import MujocoRope
 from systems.rope_pybullet import PybulletRope
 from systems.rope_scene import GRIPPER_RADIUS, Scene
@@ -227,9 +228,7 @@ class RopeRollout:
 
 def rope_length(state: RopeState) -> float:
     """Return the length of a rope from gripper A along its nodes to gripper B, in metres."""
-    points = np.concatenate([state.grippers[:1], state.nodes, state.grippers[1:]])
-    edges = points[1:] - points[:-1]
-    return float(np.sqrt(np.einsum("ij,ij->i", edges, edges)).sum())
+    return float(length_between(state.grippers, state.nodes))
 
 
 def _longest(move: Array) -> float:

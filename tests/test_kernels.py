@@ -12,6 +12,7 @@ from planners.edges import split_edges
 from planners.search_tree import nearest_rows
 from reliability.mlp_kernel import mlp_logits
 from systems.planar_arm_kernels import limited_targets, transition_features
+from systems.rope_kernels import length_between
 
 points = arrays(np.float64, (3, 3), elements=st.floats(-4, 4))
 
@@ -87,3 +88,11 @@ def test_arm_features_agree_with_array_arithmetic(current, following):
     motion = (following - current) / 0.1
     expected = np.hstack([current, np.sin(angles), np.cos(angles), motion])
     np.testing.assert_allclose(transition_features(current, following, 0.1), expected, atol=1e-12)
+
+
+@given(points, points)
+@settings(deadline=None)
+def test_rope_length_is_that_of_its_edges(grippers, nodes):
+    line = np.vstack([grippers[0], nodes, grippers[1]])
+    expected = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
+    assert length_between(grippers[:2], nodes) == pytest.approx(expected)
