@@ -11,6 +11,7 @@ estimator of the rope's features.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import os
 from functools import cache
@@ -66,20 +67,14 @@ def main(arguments: list[str] | None = None) -> None:
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     paths = {name: COLUMNS.get(name, Path(name)) for name in options.columns}
     folders = {name: options.out / _description(path, options) for name, path in paths.items()}
-    tasks = [
+    keys = list(itertools.product(seeds, options.scenes, options.columns))
+    trials = joblib.Parallel(n_jobs=options.jobs, verbose=5)(
         joblib.delayed(run_trial)(scene, seed, paths[name], options, folders[name])
-        for seed in seeds
-        for scene in options.scenes
-        for name in options.columns
-    ]
-    trials = iter(joblib.Parallel(n_jobs=options.jobs, verbose=5)(tasks))
-    rows: dict[str, dict[str, list[dict[str, Any]]]] = {
-        scene: {name: [] for name in options.columns} for scene in options.scenes
-    }
-    for _ in seeds:
-        for scene in options.scenes:
-            for name in options.columns:
-                rows[scene][name].append(next(trials))
+        for seed, scene, name in keys
+    )
+    rows: dict[str, dict[str, list[dict[str, Any]]]] = {}
+    for (_, scene, name), trial in zip(keys, trials, strict=True):
+        rows.setdefault(scene, {}).setdefault(name, []).append(trial)
     table = format_table(rows)
     options.out.joinpath("table.md").write_text(table)
     print(f"{table}\nTrials and table are in {options.out}.")

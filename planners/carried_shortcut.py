@@ -36,6 +36,14 @@ class Path:
     commands: Array
 
 
+@dataclass(frozen=True)
+class _Steps:
+    """States that were gone through, and the commands between them, maybe none."""
+
+    reduced: Array
+    commands: list[Array]
+
+
 class CarriedShortcuts:
     """Makes plans shorter by straight lines, of which every transition is checked.
 
@@ -126,54 +134,41 @@ class CarriedShortcuts:
         on_shortcut = self._doubts_if_reliable(shortcut)
         if on_shortcut is None:
             return None
-        rest = self._follow(shortcut.reduced[-1], path, last)
+        # What is carried differs behind the shortcut, until all is as it was.
+        behind = path.reduced[last:]
+        rest = self._go(shortcut.reduced[-1], behind[1:, : self._dim], behind)
         if rest is None:
             return None
-        followed, n_followed = rest
-        on_rest = self._doubts_if_reliable(followed)
-        kept = last + n_followed
+        on_rest = self._doubts_if_reliable(rest)
+        kept = last + len(rest.commands)
         if on_rest is None or on_shortcut.sum() + on_rest.sum() > doubted[first:kept].sum():
             return None
-        reduced = [path.reduced[:first], shortcut.reduced, followed.reduced[1:]]
-        commands = [path.commands[:first], shortcut.commands, followed.commands]
+        reduced = [path.reduced[:first], shortcut.reduced, rest.reduced[1:]]
+        commands = [*path.commands[:first], *shortcut.commands, *rest.commands]
         joined = Path(
             np.concatenate([*reduced, path.reduced[kept + 1 :]]),
-            np.concatenate([*commands, path.commands[kept:]]),
+            np.array([*commands, *path.commands[kept:]]),
         )
         if not self._system.goal_reached(joined.reduced[-1:], self._goals)[0]:
             return None
         return joined, np.concatenate([doubted[:first], on_shortcut, on_rest, doubted[kept:]])
 
-    def _go(self, start: Array, way: Array) -> Path | None:
-        """Go from one configuration to the next; None where that is not allowed."""
-        states: list[Array] = [start]
-        commands: list[Array] = []
-        for target in way:
-            step = self._step(states[-1], target)
-            if step is None or not self._arrived(step[1], target):
-                return None
-            commands.append(step[0])
-            states.append(step[1])
-        return Path(np.array(states), np.array(commands))
+    def _go(self, start: Array, way: Array, known: Array | None = None) -> _Steps | None:
+        """Go from one configuration to the next; None where that is not allowed.
 
-    def _follow(self, start: Array, path: Path, index: int) -> tuple[Path, int] | None:
-        """Go where a path goes from ``index`` on, until all is as on the path.
-
-        Returns what was gone and how many transitions of the path that replaces.
+        Ends where a state is the one ``known`` before that configuration.
         """
         states: list[Array] = [start]
         commands: list[Array] = []
-        for i in range(index, len(path.commands)):
-            if np.array_equal(states[-1], path.reduced[i]):
+        for i, target in enumerate(way):
+            if known is not None and np.array_equal(states[-1], known[i]):
                 break
-            target = path.reduced[i + 1, : self._dim]
             step = self._step(states[-1], target)
             if step is None or not self._arrived(step[1], target):
                 return None
             commands.append(step[0])
             states.append(step[1])
-        gone = np.reshape(commands, (len(commands), path.commands.shape[1]))
-        return Path(np.array(states), gone), len(commands)
+        return _Steps(np.array(states), commands)
 
     def _step(self, state: Array, target: Array) -> tuple[Array, Array] | None:
         command = self._system.steer(state[None], target[None])
@@ -184,9 +179,9 @@ class CarriedShortcuts:
         gap = np.abs(shortest_way(state[: self._dim], target, self._system.angular)).max()
         return bool(gap <= ARRIVED * self._system.step_size)
 
-    def _doubts_if_reliable(self, path: Path) -> Array | None:
+    def _doubts_if_reliable(self, steps: _Steps) -> Array | None:
         """Return each transition's doubt, or None if one is not classified Reliable."""
-        before, after = path.reduced[:-1], path.reduced[1:]
+        before, after = steps.reduced[:-1], steps.reduced[1:]
         doubted = np.zeros(len(before))
         for i in range(0, len(before), CLASSIFIED_AT_ONCE):
             part = slice(i, i + CLASSIFIED_AT_ONCE)

@@ -19,7 +19,6 @@ from torch.utils.data import Dataset
 from tqdm.auto import tqdm
 
 from reliability.checkpoint import Checkpoint, digest
-from reliability.voxnet import VoxNet
 
 ROWS_PER_FORWARD = 8192
 State = dict[str, NDArray[np.float32]]
@@ -330,9 +329,9 @@ def restore(
     module: type[nn.Module], module_parameters: dict[str, Any], state: State, device: str
 ) -> nn.Module:
     """Build a trained module for inference from its state, on the CPU if the device is not here."""
-    restored = module(**module_parameters)
+    restored: Any = module(**module_parameters)
     restored.load_state_dict({name: torch.from_numpy(array) for name, array in state.items()})
-    if isinstance(restored, VoxNet):
+    if hasattr(restored, "for_inference"):
         restored.for_inference()
     here = device if torch.cuda.is_available() or not device.startswith("cuda") else "cpu"
     return restored.eval().to(here)

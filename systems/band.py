@@ -98,7 +98,7 @@ def propagate_bands(
     ----------
     McConachie et al. 2020, "Reduction"; Quinlan 1994.
     """
-    reduced = _as_rows(reduced, "reduced", scene)
+    reduced = checked_bands(reduced, "reduced", scene)
     command = np.ascontiguousarray(as_finite_array(command, "command", (len(reduced), 6)))
     next_reduced, valid = np.empty_like(reduced), np.empty(len(reduced), dtype=np.bool_)
     workspace = np.empty(WORKSPACE_SHAPE)
@@ -195,18 +195,31 @@ def band_points(reduced: Array) -> Array:
     return points[: max(2, int(differs.nonzero()[0].max(initial=0)) + 2)]
 
 
+def gripper_separation(reduced: Array) -> Array:
+    """Return how far apart the grippers of each row are, metres, shape (n,)."""
+    return np.linalg.norm(reduced[:, 3:6] - reduced[:, :3], axis=1)
+
+
+def checked_bands(rows: Array, name: str, scene: Scene, n_rows: int | None = None) -> Array:
+    """Return rows as the kernels read them.
+
+    Raises
+    ------
+    ValueError
+        If they are no bands of the scene, not ``n_rows`` of them, or not finite.
+    """
+    # A copy is made only of rows that the kernels could not read.
+    return np.ascontiguousarray(as_finite_array(rows, name, (n_rows, reduced_dim(scene))))
+
+
 def _compare(
     reduced: Array, others: Array, scene: Scene, n_matched: int, max_distance: float
 ) -> NDArray[np.bool_]:
-    reduced, others = _as_rows(reduced, "reduced", scene), _as_rows(others, "others", scene)
+    reduced = checked_bands(reduced, "reduced", scene)
+    others = checked_bands(others, "others", scene)
     if len(reduced) != len(others):
         raise ValueError(f"Give as many bands as others, got {len(reduced)} and {len(others)}.")
     close = np.empty(len(reduced), dtype=np.bool_)
     workspace = np.empty((2, n_matched, 3))
     compare_rows(reduced, others, scene.packed, max_distance**2, workspace, close)
     return close
-
-
-def _as_rows(rows: Array, name: str, scene: Scene) -> Array:
-    # A copy is made only of rows that the kernels could not read.
-    return np.ascontiguousarray(as_finite_array(rows, name, (None, reduced_dim(scene))))

@@ -16,6 +16,7 @@ from systems.rope_scene import (
     GRIPPER_CLEARANCE,
     NODE_SPACING,
     ROPE_RADIUS,
+    STEP_SIZE,
     Scene,
     hanging_rope,
 )
@@ -24,7 +25,6 @@ from systems.rope_state import RopeState
 from systems.system import Array, Problem, Rollout, System
 from systems.validation import RandomState, as_finite_array, as_generator
 
-STEP_SIZE = 0.025
 GOAL_DISTANCE = 0.025
 # Starts are no nearer to the goal than this share of the scene's own way: from behind all
 # obstacles there is nothing to learn.
@@ -160,7 +160,8 @@ class Rope(System):
         -------
         X : ndarray of shape (n, n_features)
             With "voxels", uint8 of 12288 features: see
-            :func:`systems.rope_voxels.voxel_features`. With "vector", float64 of 13: see
+            :func:`systems.rope_voxels.voxel_features`. With "curtain", float32 of 270: see
+            :func:`systems.rope_curtain.curtain_features`. With "vector", float64 of 13: see
             :func:`systems.rope_features.vector_features`.
         """
         return FEATURES[self.feature_kind](reduced, next_reduced, self.scene)

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from systems.band import band_length, reduced_dim
+from systems.band import band_length, checked_bands, gripper_separation
 from systems.obstacles import Array
 from systems.rope_curtain_kernels import N_COLUMNS, N_ROWS, fill_curtains
-from systems.rope_scene import Scene
-from systems.validation import as_finite_array
+from systems.rope_scene import STEP_SIZE, Scene
 
-N_CURTAIN_FEATURES = 2 * (N_COLUMNS * N_ROWS + 4) + 6
-_STEP = 0.025
 _LEAST_SPAN = 1e-6
 
 
@@ -37,10 +34,8 @@ def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array
     -------
     X : ndarray of float32 of shape (n, 270)
     """
-    dim = reduced_dim(scene)
-    before = np.ascontiguousarray(as_finite_array(reduced, "reduced", (None, dim)))
-    shape = (len(before), dim)
-    after = np.ascontiguousarray(as_finite_array(next_reduced, "next_reduced", shape))
+    before = checked_bands(reduced, "reduced", scene)
+    after = checked_bands(next_reduced, "next_reduced", scene, len(before))
     rows = [_curtains(before, scene), _curtains(after, scene), _motion(before, after)]
     return np.hstack(rows).astype(np.float32)
 
@@ -68,8 +63,8 @@ def reversed_ends(features: Array) -> Array:
 def _curtains(rows: Array, scene: Scene) -> Array:
     curtains, depths = np.empty((len(rows), N_COLUMNS * N_ROWS)), np.empty(len(rows))
     fill_curtains(rows, scene.packed, scene.rope_length, curtains, depths)
-    separation = np.linalg.norm(rows[:, 3:6] - rows[:, :3], axis=1)
-    lengths = np.column_stack([separation, band_length(rows), rows[:, 5] - rows[:, 2], depths])
+    rise = rows[:, 5] - rows[:, 2]
+    lengths = np.column_stack([gripper_separation(rows), band_length(rows), rise, depths])
     return np.hstack([curtains, lengths / scene.rope_length])
 
 
@@ -78,7 +73,7 @@ def _motion(before: Array, after: Array) -> Array:
     span = before[:, 3:5] - before[:, :2]
     length = np.linalg.norm(span, axis=1, keepdims=True)
     along = np.where(length > _LEAST_SPAN, span / np.maximum(length, _LEAST_SPAN), [1.0, 0.0])
-    moved = (after[:, :6] - before[:, :6]).reshape(-1, 2, 3) / _STEP
+    moved = (after[:, :6] - before[:, :6]).reshape(-1, 2, 3) / STEP_SIZE
     x = np.einsum("ngk,nk->ng", moved[..., :2], along)
     y = moved[..., 1] * along[:, None, 0] - moved[..., 0] * along[:, None, 1]
     return np.stack([x, y, moved[..., 2]], axis=2).reshape(-1, 6)

@@ -20,12 +20,18 @@ NEAREST, FARTHEST, UNIT = -0.05, 0.15, 0.05
 
 
 @njit(cache=True, nogil=True)
+def shadow_length(row: Any, i: int) -> float:
+    """Length of the shadow that a band's segment from point ``i`` casts on the floor."""
+    x, y = row[9 + 3 * i] - row[6 + 3 * i], row[10 + 3 * i] - row[7 + 3 * i]
+    return np.sqrt(x * x + y * y)
+
+
+@njit(cache=True, nogil=True)
 def horizontal_length(row: Any, n: int) -> float:
     """Length of the shadow that a band casts on the floor."""
     total = 0.0
     for i in range(n - 1):
-        x, y = row[9 + 3 * i] - row[6 + 3 * i], row[10 + 3 * i] - row[7 + 3 * i]
-        total += np.sqrt(x * x + y * y)
+        total += shadow_length(row, i)
     return total
 
 
@@ -42,16 +48,13 @@ def fill_curtain(row: Any, packed: Any, rope_length: float, out: Any) -> float:
     bend = 0.0
     if rope_length * rope_length > width * width + rise * rise:
         bend = parabola_bend(width, rise, rope_length)
-    i, travelled, segment = 0, 0.0, 0.0
-    x, y = row[9] - row[6], row[10] - row[7]
-    segment = np.sqrt(x * x + y * y)
+    i, travelled, segment = 0, 0.0, shadow_length(row, 0)
     for column in range(N_COLUMNS):
         at = (column + 0.5) / N_COLUMNS
         while i < n - 2 and travelled + segment < at * shadow:
             travelled += segment
             i += 1
-            x, y = row[9 + 3 * i] - row[6 + 3 * i], row[10 + 3 * i] - row[7 + 3 * i]
-            segment = np.sqrt(x * x + y * y)
+            segment = shadow_length(row, i)
         ratio = (at * shadow - travelled) / segment if segment > 1e-12 else at
         ratio = min(1.0, max(0.0, ratio))
         px = row[6 + 3 * i] + ratio * (row[9 + 3 * i] - row[6 + 3 * i])

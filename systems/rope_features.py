@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.band import band_length, reduced_dim
+from systems.band import band_length, checked_bands, gripper_separation
 from systems.obstacles import Array
 from systems.rope_curtain import curtain_features
 from systems.rope_feature_kernels import CELL, fill_components
 from systems.rope_scene import Scene
 from systems.rope_voxels import voxel_features
-from systems.validation import as_finite_array
 
 
 def vector_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array:
@@ -42,21 +41,16 @@ def vector_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array:
     McConachie et al. 2020, "Application to rope manipulation"; the slice from the authors'
     public code.
     """
-    dim = reduced_dim(scene)
-    before = np.ascontiguousarray(as_finite_array(reduced, "reduced", (None, dim)))
-    shape = (len(before), dim)
-    after = np.ascontiguousarray(as_finite_array(next_reduced, "next_reduced", shape))
-    lengths = [_separation(before), _separation(after), band_length(before), band_length(after)]
+    before = checked_bands(reduced, "reduced", scene)
+    after = checked_bands(next_reduced, "next_reduced", scene, len(before))
+    both = before, after
+    lengths = [*map(gripper_separation, both), *map(band_length, both)]
     columns = [length / scene.max_band_length for length in lengths]
     parts, next_parts = _slice_parts(before, scene), _slice_parts(after, scene)
     for kind in range(3):
         one, other = parts[:, kind], next_parts[:, kind]
         columns += [one, other, other - one]
     return np.column_stack(columns)
-
-
-def _separation(rows: Array) -> Array:
-    return np.linalg.norm(rows[:, 3:6] - rows[:, :3], axis=1)
 
 
 def _slice_parts(rows: Array, scene: Scene) -> Array:

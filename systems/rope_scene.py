@@ -18,6 +18,8 @@ NODE_SPACING = 0.02
 # A gripper is a sphere around the point where it holds the rope; planners keep more away.
 GRIPPER_RADIUS = 0.023
 GRIPPER_CLEARANCE = 0.03
+# The longest displacement of both grippers together in one transition.
+STEP_SIZE = 0.025
 MAX_STRETCH = 1.15
 
 _GRIPPERS = ("A", "B")

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.band import N_MATCHED, reduced_dim
+from systems.band import N_MATCHED, checked_bands
 from systems.obstacles import Array
 from systems.rope_scene import Scene
 from systems.rope_voxel_kernels import SIDE, fill_voxels
-from systems.validation import as_finite_array
 
 N_CHANNELS = 3
 PACKED_BYTES = N_CHANNELS * SIDE**3 // 8
@@ -38,10 +37,8 @@ def voxel_features(reduced: Array, next_reduced: Array, scene: Scene) -> NDArray
     McConachie et al. 2020, "Application to rope manipulation"; the size of the grid from the
     authors' public code.
     """
-    dim = reduced_dim(scene)
-    before = np.ascontiguousarray(as_finite_array(reduced, "reduced", (None, dim)))
-    shape = (len(before), dim)
-    after = np.ascontiguousarray(as_finite_array(next_reduced, "next_reduced", shape))
+    before = checked_bands(reduced, "reduced", scene)
+    after = checked_bands(next_reduced, "next_reduced", scene, len(before))
     rows = np.zeros((len(before), PACKED_BYTES), dtype=np.uint8)
     side = scene.max_band_length
     fill_voxels(before, after, scene.packed, scene.bounds, side, N_MATCHED, rows)
