@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from literal_planner import LiteralPlanner
 
-from planners import BiasedRRTConnect, PlanResult
+from planners import BiasedRRTConnect, PlanResult, likeliest_plan
 from systems import PlanarArm, Problem
 
 PLANNERS = ("none", "none, holdable goals", "literal", "ours")
@@ -68,16 +67,10 @@ def most_reliable_plan(
     A transition is Reliable if the execution is where the plan says, so that of the last one is
     the probability that the plan arrives.
     """
-    plans = [
-        make_planner("ours", arm, classifiers, n_plans * seed + i).plan(start, goal)
-        for i in range(n_plans)
-    ]
-    best = max(plans, key=lambda plan: plan.reliability[-1] if plan.success else 0.0)
-    return replace(
-        best,
-        planning_time=sum(plan.planning_time for plan in plans),
-        simplification_time=sum(plan.simplification_time for plan in plans),
-        n_checked=sum(plan.n_checked for plan in plans),
+    return likeliest_plan(
+        lambda i: make_planner("ours", arm, classifiers, n_plans * seed + i).plan(start, goal),
+        n_plans,
+        merit=lambda plan: float(plan.reliability[-1]),
     )
 
 

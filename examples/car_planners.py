@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from car_waypoints import move_waypoints
 
-from planners import BiasedRRT, BiasedRRTConnect, PlanResult
+from planners import BiasedRRT, BiasedRRTConnect, PlanResult, likeliest_plan
 from systems import Car, CarScene, Problem
 from systems.angles import shortest_way
 
@@ -71,20 +70,11 @@ def plan_query(
 
 def promising_plan(car: Car, classifier: Any, problem: Problem, seed: int) -> PlanResult:
     """Plan until a plan is likely enough to go well, and keep the likeliest."""
-    plans: list[PlanResult] = []
-    while len(plans) < MOST_PLANS and max(map(promise, plans), default=0) < PROMISE:
-        plans.append(careful_plan(car, classifier, problem, MOST_PLANS * seed + len(plans)))
-    return replace(
-        max(plans, key=promise),
-        planning_time=sum(plan.planning_time for plan in plans),
-        simplification_time=sum(plan.simplification_time for plan in plans),
-        n_checked=sum(plan.n_checked for plan in plans),
+    return likeliest_plan(
+        lambda i: careful_plan(car, classifier, problem, MOST_PLANS * seed + i),
+        MOST_PLANS,
+        enough=PROMISE,
     )
-
-
-def promise(plan: PlanResult) -> float:
-    """Return the probability, after the classifier, that all of a plan goes well."""
-    return float(plan.reliability.prod()) if plan.success else 0.0
 
 
 def careful_plan(car: Car, classifier: Any, problem: Problem, seed: int) -> PlanResult:

@@ -9,15 +9,24 @@ from planners.result import PlanResult, PlanStatus
 
 if TYPE_CHECKING:
     from planners.check_transition import CheckTransition
+    from planners.repeated import likeliest_plan
     from planners.rrt import BiasedRRT
     from planners.rrt_connect import BiasedRRTConnect
 
-__all__ = ["BiasedRRT", "BiasedRRTConnect", "CheckTransition", "PlanResult", "PlanStatus"]
+__all__ = [
+    "BiasedRRT",
+    "BiasedRRTConnect",
+    "CheckTransition",
+    "PlanResult",
+    "PlanStatus",
+    "likeliest_plan",
+]
 
 _HOMES = {
     "BiasedRRT": "planners.rrt",
     "BiasedRRTConnect": "planners.rrt_connect",
     "CheckTransition": "planners.check_transition",
+    "likeliest_plan": "planners.repeated",
 }
 
 

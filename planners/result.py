@@ -74,6 +74,16 @@ class PlanResult:
         """Whether the plan reaches the goal; False for anything short of it."""
         return self.status is PlanStatus.SOLVED
 
+    @property
+    def promise(self) -> float:
+        """Probability that all transitions are Reliable, if they don't depend on one another.
+
+        1 without an estimator, and 0 without a plan.
+        """
+        if not self.success:
+            return 0.0
+        return 1.0 if self.reliability is None else float(self.reliability.prod())
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file."""
         values: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}

@@ -12,7 +12,7 @@ from planners import BiasedRRT, BiasedRRTConnect
 from systems import Car, CarScene, Circle, Problem, random_car_scene
 
 sys.path.append(str(Path(__file__).parents[1] / "examples"))
-from car_planners import TrueCar, plan_query, promise
+from car_planners import TrueCar, plan_query
 from car_waypoints import move_waypoints
 
 BEHIND = CarScene((Circle(3.0, 2.0, 0.4),), (0.0, 0.0, 6.0, 4.0))
@@ -72,7 +72,7 @@ def test_moved_waypoints_are_never_less_reliable(seed):
     planner = BiasedRRTConnect(car, classifier, k=np.inf, max_iterations=500, random_state=seed)
     plan = planner.plan(problem.start[:3], problem.goal)
     moved = move_waypoints(car, classifier, plan, seed)
-    assert promise(moved) >= promise(plan) * (1 - 1e-6)
+    assert moved.promise >= plan.promise * (1 - 1e-6)
     if plan.success:
         np.testing.assert_array_equal(moved.reduced[[0, -1]], plan.reduced[[0, -1]])
         following, valid = car.propagate(moved.reduced[:-1], moved.commands)
