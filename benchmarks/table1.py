@@ -12,24 +12,18 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import json
-import os
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import joblib
 import numpy as np
 from scipy.stats import binomtest
+from table1_trials import run_trial
 
-from planners import BiasedRRT
 from reliability import load_estimator
-from systems import Problem, Rope, SimulationDivergedError
 from systems.rope_features import FEATURES
 from systems.rope_scenes import SCENE_NAMES
 
-TOLERANCE = 0.025
-MAX_ITERATIONS = 10**8
 MODELS = Path(__file__).parents[1] / "examples" / "models"
 COLUMNS = {
     "none": None,
@@ -88,72 +82,6 @@ def _description(path: Path | None, options: argparse.Namespace) -> str:
         accuracy = "own" if options.accuracy is None else f"{options.accuracy:g}"
         planner = f"{path.stem}-{digest}-k{options.k:g}-accuracy-{accuracy}"
     return f"{planner}-{options.engine}-{options.time_limit:g}s"
-
-
-@cache
-def _scene(name: str, engine: str, features: str) -> tuple[Rope, Problem, np.ndarray]:
-    rope = Rope(name, engine, features)
-    problem = rope.scene_problem()
-    return rope, problem, rope.reduce(problem.start)
-
-
-@cache
-def _model(path: Path | None) -> Any:
-    return None if path is None else load_estimator(path)
-
-
-def run_trial(
-    name: str, seed: int, model: Path | None, options: argparse.Namespace, folder: Path
-) -> dict[str, Any]:
-    """Plan and execute once, or read what an earlier run found."""
-    file = folder / name / f"seed-{seed:03d}.json"
-    if file.exists():
-        return dict(json.loads(file.read_text()))
-    estimator = _model(model)
-    features = getattr(estimator, "provenance_", {}).get("features", options.features)
-    rope, problem, start = _scene(name, options.engine, features)
-    planner = BiasedRRT(
-        rope,
-        estimator,
-        k=options.k,
-        accuracy=options.accuracy,
-        max_iterations=MAX_ITERATIONS,
-        time_limit=options.time_limit,
-        random_state=seed,
-    )
-    # A plan that takes no time compiles everything first.
-    planner.plan(start, start[:6])
-    result = planner.plan(start, problem.goal)
-    trial = {
-        "scene": name,
-        "seed": seed,
-        "solved": result.success,
-        "planning": result.planning_time,
-        "smoothing": result.simplification_time,
-        "n_transitions": len(result.commands),
-        "n_nodes": len(result.tree) + 1,
-        "n_checked": result.n_checked,
-        **_execute(rope, problem, result.commands, result.success),
-    }
-    file.parent.mkdir(parents=True, exist_ok=True)
-    partial = file.with_suffix(".partial")
-    partial.write_text(json.dumps(trial) + "\n")
-    os.replace(partial, file)
-    return trial
-
-
-def _execute(rope: Rope, problem: Problem, commands: np.ndarray, solved: bool) -> dict[str, Any]:
-    if not solved:
-        return {"success": False, "stop_reason": "no plan", "n_completed": 0}
-    try:
-        rollout = rope.rollout(problem.start, commands)
-    except SimulationDivergedError:
-        return {"success": False, "stop_reason": "diverged", "n_completed": 0}
-    return {
-        "success": rope.succeeded(rollout.states[-1], problem.goal, TOLERANCE),
-        "stop_reason": rollout.stop_reason.name.lower(),
-        "n_completed": rollout.n_completed,
-    }
 
 
 def format_table(trials: dict[str, dict[str, list[dict[str, Any]]]]) -> str:

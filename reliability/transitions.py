@@ -13,6 +13,7 @@ from reliability.labels import RELIABLE, UNRELIABLE
 from reliability.packed_rows import PackedRows, as_bits
 from systems.archive import read_arrays, write_arrays
 from systems.system import System
+from systems.validation import check_count
 
 FORMAT_VERSION = 2
 
@@ -107,6 +108,27 @@ class Transitions:
         columns = {name: getattr(self, name)[index] for name in _COLUMNS}
         states = self._states.take(pairs[kept])
         return self._of_states(states, _first_states(follows_on), columns)
+
+    def up_to_first_mistake(self, n_after: int) -> Transitions:
+        """Leave out what each plan did long after its execution went astray.
+
+        Once the execution has diverged, all that follows is Unreliable, whatever it is: it says
+        where executions are that went wrong before, and not what makes them go wrong.
+
+        Parameters
+        ----------
+        n_after : int
+            Unreliable transitions to keep of each plan, from the first one on.
+
+        Returns
+        -------
+        transitions : Transitions
+        """
+        check_count(n_after, "n_after")
+        _, plan = np.unique(self.plan, return_inverse=True)
+        first = np.full(plan.max(initial=-1) + 1, np.inf)
+        np.minimum.at(first, plan, np.where(self.y == UNRELIABLE, self.step, np.inf))
+        return self[self.step < first[plan] + n_after]
 
     @classmethod
     def concatenate(cls, parts: Sequence[Transitions]) -> Transitions:

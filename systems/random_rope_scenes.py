@@ -56,7 +56,7 @@ def _draw_scene(rng: np.random.Generator) -> Scene:
     wall_x = float(rng.uniform(-0.6, 0.6))
     wall = _Wall.drawn(rng, wall_x, half_width) if rng.random() < SHARE_WITH_WALL else None
     hooks: list[Obstacle] = []
-    for i in range(int(rng.integers(1, 5))):
+    for i in range(int(rng.integers(1, 9))):
         draw = _HOOKS[rng.integers(len(_HOOKS))]
         hooks += draw(rng, wall_x if wall is not None else None, half_width, f"{i + 1}")
     slotted = _slotted_wall(rng, half_width) if rng.random() < SHARE_WITH_SLOT else []

@@ -6,10 +6,17 @@ import numpy as np
 
 from systems.band import band_length, checked_bands, gripper_separation
 from systems.obstacles import Array
-from systems.rope_curtain_kernels import N_COLUMNS, N_ROWS, fill_curtains
+from systems.rope_curtain_kernels import LEAST_SPAN, N_COLUMNS, N_ROWS, fill_curtains
 from systems.rope_scene import STEP_SIZE, Scene
+from systems.rope_slice import slice_counts
 
-_LEAST_SPAN = 1e-6
+ASIDE = 0.05
+
+_N_CELLS = N_COLUMNS * N_ROWS
+_N_LENGTHS = 4
+_CURTAINS = (0, _N_CELLS + _N_LENGTHS)
+_LEFT = 2 * (_N_CELLS + _N_LENGTHS)
+_RIGHT = _LEFT + _N_CELLS
 
 
 def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array:
@@ -19,11 +26,13 @@ def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array
     band, as deep as the slack lets it. What catches the rope goes through this curtain. Before
     and after the transition, the signed distance to the obstacles is taken on a grid of 16
     columns along the band by 8 rows from the band down to a little below the rope, clipped to
-    -0.05 and 0.15 m, in units of 0.05 m. Then come the distance between the grippers, the
-    length of the band, the rise from gripper A to B and the depth of the rope, as shares of the
-    rope's length, before and after; and the motion of the grippers in steps of 0.025 m: along
-    the horizontal direction from A to B, across it, and up. The features are the same wherever
-    the scene is put and however it is turned about the vertical.
+    -0.05 and 0.15 m, in units of 0.05 m; each is followed by the distance between the grippers,
+    the length of the band, the rise from gripper A to B and the depth of the rope, as shares of
+    the rope's length. Then come two more curtains after the transition, 0.05 m to the left of the
+    band, seen from A, and to the right; the parts of the slice between the grippers
+    (:func:`systems.rope_slice.slice_counts`); and the motion of the grippers in steps of 0.025 m:
+    along the horizontal direction from A to B, across it, and up. The features are the same
+    wherever the scene is put and however it is turned about the vertical.
 
     Parameters
     ----------
@@ -32,11 +41,18 @@ def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array
 
     Returns
     -------
-    X : ndarray of float32 of shape (n, 270)
+    X : ndarray of float32 of shape (n, 535)
     """
     before = checked_bands(reduced, "reduced", scene)
     after = checked_bands(next_reduced, "next_reduced", scene, len(before))
-    rows = [_curtains(before, scene), _curtains(after, scene), _motion(before, after)]
+    rows = [
+        *_curtains(before, 0.0, scene),
+        *_curtains(after, 0.0, scene),
+        _curtains(after, ASIDE, scene)[0],
+        _curtains(after, -ASIDE, scene)[0],
+        slice_counts(before, after, scene),
+        _motion(before, after),
+    ]
     return np.hstack(rows).astype(np.float32)
 
 
@@ -44,35 +60,42 @@ def mirrored(features: Array) -> Array:
     """Return the features of the same transitions in a mirror that stands along the rope."""
     image = features.copy()
     image[:, [-5, -2]] *= -1.0
+    image[:, _LEFT : _RIGHT + _N_CELLS] = _sides_exchanged(features)
     return image
 
 
 def reversed_ends(features: Array) -> Array:
     """Return the features of the same transitions with the names of the grippers exchanged."""
     image = features.copy()
-    n_cells = N_COLUMNS * N_ROWS
-    for first in (0, n_cells + 4):
-        cells = features[:, first : first + n_cells].reshape(-1, N_COLUMNS, N_ROWS)
-        image[:, first : first + n_cells] = cells[:, ::-1].reshape(-1, n_cells)
-        image[:, first + n_cells + 2] *= -1.0
+    image[:, _LEFT : _RIGHT + _N_CELLS] = _sides_exchanged(features)
+    for first in (*_CURTAINS, _LEFT, _RIGHT):
+        cells = image[:, first : first + _N_CELLS].reshape(-1, N_COLUMNS, N_ROWS)
+        image[:, first : first + _N_CELLS] = cells[:, ::-1].reshape(-1, _N_CELLS)
+    image[:, [first + _N_CELLS + 2 for first in _CURTAINS]] *= -1.0
     turned = np.array([-1.0, -1.0, 1.0], dtype=features.dtype)
     image[:, -6:-3], image[:, -3:] = features[:, -3:] * turned, features[:, -6:-3] * turned
     return image
 
 
-def _curtains(rows: Array, scene: Scene) -> Array:
-    curtains, depths = np.empty((len(rows), N_COLUMNS * N_ROWS)), np.empty(len(rows))
-    fill_curtains(rows, scene.packed, scene.rope_length, curtains, depths)
+def _sides_exchanged(features: Array) -> Array:
+    left, right = features[:, _LEFT:_RIGHT], features[:, _RIGHT : _RIGHT + _N_CELLS]
+    return np.hstack([right, left])
+
+
+def _curtains(rows: Array, aside: float, scene: Scene) -> tuple[Array, Array]:
+    """Return the distances on curtains, and the lengths of their bands."""
+    curtains, depths = np.empty((len(rows), _N_CELLS)), np.empty(len(rows))
+    fill_curtains(rows, aside, scene.packed, scene.rope_length, curtains, depths)
     rise = rows[:, 5] - rows[:, 2]
     lengths = np.column_stack([gripper_separation(rows), band_length(rows), rise, depths])
-    return np.hstack([curtains, lengths / scene.rope_length])
+    return curtains, lengths / scene.rope_length
 
 
 def _motion(before: Array, after: Array) -> Array:
     """Displacements of A and B along, across and up, shape (n, 6)."""
     span = before[:, 3:5] - before[:, :2]
     length = np.linalg.norm(span, axis=1, keepdims=True)
-    along = np.where(length > _LEAST_SPAN, span / np.maximum(length, _LEAST_SPAN), [1.0, 0.0])
+    along = np.where(length > LEAST_SPAN, span / np.maximum(length, LEAST_SPAN), [1.0, 0.0])
     moved = (after[:, :6] - before[:, :6]).reshape(-1, 2, 3) / STEP_SIZE
     x = np.einsum("ngk,nk->ng", moved[..., :2], along)
     y = moved[..., 1] * along[:, None, 0] - moved[..., 0] * along[:, None, 1]

@@ -17,6 +17,8 @@ N_ROWS = 8
 DEPTH = 1.2
 # Distances beyond these, in metres, are all the same to a rope.
 NEAREST, FARTHEST, UNIT = -0.05, 0.15, 0.05
+# Grippers that are nearer, in metres and seen from above, give no direction.
+LEAST_SPAN = 1e-6
 
 
 @njit(cache=True, nogil=True)
@@ -36,11 +38,12 @@ def horizontal_length(row: Any, n: int) -> float:
 
 
 @njit(cache=True, nogil=True)
-def fill_curtain(row: Any, packed: Any, rope_length: float, out: Any) -> float:
+def fill_curtain(row: Any, aside: float, packed: Any, rope_length: float, out: Any) -> float:
     """Write clipped distances on a grid below a band; return how deep the rope hangs.
 
-    Columns are evenly spaced along the band's shadow. The rope hangs below the band by the
-    parabola that it would hang in if the band were straightened in a vertical plane.
+    The grid may stand aside of the band, to the left of the way from A to B. Columns are evenly
+    spaced along the band's shadow. The rope hangs below the band by the parabola that it would
+    hang in if the band were straightened in a vertical plane.
     """
     n = n_points(row)
     shadow = horizontal_length(row, n)
@@ -48,6 +51,7 @@ def fill_curtain(row: Any, packed: Any, rope_length: float, out: Any) -> float:
     bend = 0.0
     if rope_length * rope_length > width * width + rise * rise:
         bend = parabola_bend(width, rise, rope_length)
+    dx, dy = _leftwards(row, aside)
     i, travelled, segment = 0, 0.0, shadow_length(row, 0)
     for column in range(N_COLUMNS):
         at = (column + 0.5) / N_COLUMNS
@@ -57,8 +61,8 @@ def fill_curtain(row: Any, packed: Any, rope_length: float, out: Any) -> float:
             segment = shadow_length(row, i)
         ratio = (at * shadow - travelled) / segment if segment > 1e-12 else at
         ratio = min(1.0, max(0.0, ratio))
-        px = row[6 + 3 * i] + ratio * (row[9 + 3 * i] - row[6 + 3 * i])
-        py = row[7 + 3 * i] + ratio * (row[10 + 3 * i] - row[7 + 3 * i])
+        px = dx + row[6 + 3 * i] + ratio * (row[9 + 3 * i] - row[6 + 3 * i])
+        py = dy + row[7 + 3 * i] + ratio * (row[10 + 3 * i] - row[7 + 3 * i])
         pz = row[8 + 3 * i] + ratio * (row[11 + 3 * i] - row[8 + 3 * i])
         sag = bend * width * width * at * (1.0 - at)
         for j in range(N_ROWS):
@@ -68,7 +72,19 @@ def fill_curtain(row: Any, packed: Any, rope_length: float, out: Any) -> float:
 
 
 @njit(cache=True, nogil=True)
-def fill_curtains(rows: Any, packed: Any, rope_length: float, out: Any, depths: Any) -> None:
+def _leftwards(row: Any, aside: float) -> Any:
+    """Return ``aside`` times the horizontal direction to the left of the way from A to B."""
+    x, y = row[3] - row[0], row[4] - row[1]
+    length = np.sqrt(x * x + y * y)
+    if length > LEAST_SPAN:
+        return -aside * y / length, aside * x / length
+    return 0.0, aside
+
+
+@njit(cache=True, nogil=True)
+def fill_curtains(
+    rows: Any, aside: float, packed: Any, rope_length: float, out: Any, depths: Any
+) -> None:
     """Write the curtain of each row, and how deep its rope hangs."""
     for i in range(rows.shape[0]):
-        depths[i] = fill_curtain(rows[i], packed, rope_length, out[i])
+        depths[i] = fill_curtain(rows[i], aside, packed, rope_length, out[i])

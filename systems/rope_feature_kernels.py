@@ -66,12 +66,18 @@ def fill_slice(row: Any, packed: Any, length: float, cells: Any) -> tuple[int, i
         s = (i - 0.5) * CELL
         chord = rise / width * s
         curve = chord - bend * s * (width - s)
+        x, y, kind, alike = row[0] + s * ux, row[1] + s * uy, _FREE, 0
         for j in range(m):
             z = low + (j - 0.5) * CELL
             cells[i, j] = _OCCUPIED
-            inside = 0 < i < n - 1 and 0 < j < m - 1 and s < width and curve <= z <= chord
-            if inside and distance(row[0] + s * ux, row[1] + s * uy, row[2] + z, packed) > 0.0:
-                cells[i, j] = _FREE
+            if 0 < i < n - 1 and 0 < j < m - 1 and s < width and curve <= z <= chord:
+                if alike == 0:
+                    d = distance(x, y, row[2] + z, packed)
+                    kind = _FREE if d > 0.0 else _OCCUPIED
+                    # No cell that is nearer than the surface is of the other kind.
+                    alike = 1 + max(0, int(abs(d) / CELL - 1e-6))
+                cells[i, j] = kind
+                alike -= 1
     return n, m
 
 
