@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -104,10 +104,7 @@ def train_vector(simple_hook: SceneData) -> Any:
         )
         return boosting.fit(X[rows], y[rows])
 
-    accuracies = []
-    for groups in (None, plans):
-        training, apart = _split(y, groups, HELD_OUT)
-        accuracies.append(float(np.mean(fitted(training).predict(X[apart]) == y[apart])))
+    accuracies = _held_out_accuracies(fitted, X, y, plans)
     classifier = fitted(np.arange(len(y)))
     classifier.validation_accuracy_ = accuracies[0]
     classifier.provenance_ = provenance(
@@ -159,10 +156,7 @@ def fit_curtains(parts: Sequence[SceneData]) -> Any:
         drawn = rng.choice(rows, len(rows), p=weight[rows] / weight[rows].sum())
         return boosting.fit(X[drawn], y[drawn])
 
-    accuracies = []
-    for groups in (None, np.where(scenes == 0, plans, -scenes)):
-        training, apart = _split(y, groups, HELD_OUT)
-        accuracies.append(float(np.mean(fitted(training).predict(X[apart]) == y[apart])))
+    accuracies = _held_out_accuracies(fitted, X, y, np.where(scenes == 0, plans, -scenes))
     classifier = fitted(np.arange(len(y)))
     classifier.validation_accuracy_ = accuracies[0]
     classifier.provenance_ = provenance("curtain", parts, *accuracies)
@@ -194,6 +188,17 @@ def provenance(
         "accuracy by plan": by_plan,
         "versions": {name: version(name) for name in PACKAGES} | {"this library": __version__},
     }
+
+
+def _held_out_accuracies(
+    fitted: Callable[[np.ndarray], Any], X: np.ndarray, y: np.ndarray, groups: np.ndarray
+) -> list[float]:
+    """Return the accuracies by transition and by group; ``fitted`` trains on some rows."""
+    accuracies = []
+    for split_by in (None, groups):
+        training, apart = _split(y, split_by, HELD_OUT)
+        accuracies.append(float(np.mean(fitted(training).predict(X[apart]) == y[apart])))
+    return accuracies
 
 
 def _split(y: np.ndarray, groups: np.ndarray | None, share: float) -> tuple[np.ndarray, np.ndarray]:

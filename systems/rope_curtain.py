@@ -46,8 +46,8 @@ def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array
     before = checked_bands(reduced, "reduced", scene)
     after = checked_bands(next_reduced, "next_reduced", scene, len(before))
     rows = [
-        *_curtains(before, 0.0, scene),
-        *_curtains(after, 0.0, scene),
+        *_curtain_and_lengths(before, scene),
+        *_curtain_and_lengths(after, scene),
         _curtains(after, ASIDE, scene)[0],
         _curtains(after, -ASIDE, scene)[0],
         slice_counts(before, after, scene),
@@ -82,13 +82,19 @@ def _sides_exchanged(features: Array) -> Array:
     return np.hstack([right, left])
 
 
-def _curtains(rows: Array, aside: float, scene: Scene) -> tuple[Array, Array]:
-    """Return the distances on curtains, and the lengths of their bands."""
-    curtains, depths = np.empty((len(rows), _N_CELLS)), np.empty(len(rows))
-    fill_curtains(rows, aside, scene.packed, scene.rope_length, curtains, depths)
+def _curtain_and_lengths(rows: Array, scene: Scene) -> tuple[Array, Array]:
+    """Return the distances on curtains below bands, and the lengths of the bands."""
+    curtains, depths = _curtains(rows, 0.0, scene)
     rise = rows[:, 5] - rows[:, 2]
     lengths = np.column_stack([gripper_separation(rows), band_length(rows), rise, depths])
     return curtains, lengths / scene.rope_length
+
+
+def _curtains(rows: Array, aside: float, scene: Scene) -> tuple[Array, Array]:
+    """Return the distances on curtains, and how deep the ropes hang."""
+    curtains, depths = np.empty((len(rows), _N_CELLS)), np.empty(len(rows))
+    fill_curtains(rows, aside, scene.packed, scene.rope_length, curtains, depths)
+    return curtains, depths
 
 
 def _motion(before: Array, after: Array) -> Array:

@@ -65,7 +65,7 @@ class ScenePictures:
         self._camera = mujoco.MjvCamera()
         low, high = scene.bounds
         self._camera.lookat[:] = low + (high - low) * (0.5, 0.5, 0.25)
-        self._camera.distance = 1.0 * float(np.linalg.norm(high - low))
+        self._camera.distance = float(np.linalg.norm(high - low))
         self._camera.azimuth, self._camera.elevation = azimuth, elevation
 
     def __enter__(self) -> ScenePictures:
