@@ -89,6 +89,10 @@ def test_control_c_interrupts_a_search(planner, fast):
     code = (
         PLAN
         + f"""
+import signal
+# A shell's background job, and so its children, would ignore the signal.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
 class Never(Picky):
     def predict(self, X):
         return np.zeros(len(X), dtype=int)
