@@ -13,7 +13,7 @@ from systems.validation import RandomState, as_generator
 
 LEAST_LINKS, MOST_LINKS = 25, 70
 WALL_THICKNESS = 0.05
-SHARE_WITH_WALL, SHARE_WITH_SLOT = 0.7, 0.4
+SHARE_WITH_WALL, SHARE_WITH_SLOT, SHARE_GUARDED = 0.7, 0.4, 0.5
 
 _HEIGHT = 0.4
 _HALF_LENGTH = 1.3
@@ -63,6 +63,8 @@ def _draw_scene(rng: np.random.Generator) -> Scene:
     if wall is not None:
         obstacles += wall.obstacles(half_width, at_slot=bool(slotted))
     obstacles += hooks + slotted
+    if wall is not None and slotted and rng.random() < SHARE_GUARDED:
+        obstacles.append(_guard(rng, wall_x, slot_y=float(slotted[0].center[1])))
     return Scene(
         obstacles=obstacles,
         bounds=np.array([[-_HALF_LENGTH, hall[0], -_HEIGHT], [_HALF_LENGTH, hall[1], _HEIGHT]]),
@@ -107,7 +109,7 @@ class _Wall:
         ]
 
 
-def _slotted_wall(rng: np.random.Generator, half_width: float) -> list[Obstacle]:
+def _slotted_wall(rng: np.random.Generator, half_width: float) -> list[Box]:
     """Draw a wall along the hall that only the rope can pass through: it parts the grippers."""
     y, slot = float(rng.uniform(-0.5, 0.5)) * half_width, 0.05
     along, thick = (-_HALF_LENGTH, float(rng.uniform(0.0, 0.8))), (y, y + WALL_THICKNESS)
@@ -115,6 +117,16 @@ def _slotted_wall(rng: np.random.Generator, half_width: float) -> list[Obstacle]
         _box(along, thick, (-_HEIGHT, -0.5 * slot), "lower slotted wall"),
         _box(along, thick, (0.5 * slot, _HEIGHT), "upper slotted wall"),
     ]
+
+
+def _guard(rng: np.random.Generator, wall_x: float, slot_y: float) -> Box:
+    """Draw a bar on a wall, beside a slot and just below the rope that comes through it."""
+    reach, thick = float(rng.uniform(0.05, 0.5)), float(rng.uniform(0.03, 0.07))
+    aside = float(rng.uniform(0.05, 0.25)) * float(rng.choice([-1.0, 1.0]))
+    y, top = slot_y + aside, float(rng.uniform(-0.08, 0.0))
+    return _box(
+        (wall_x - reach, wall_x), (y - 0.5 * thick, y + 0.5 * thick), (top - thick, top), "guard"
+    )
 
 
 def _bar(

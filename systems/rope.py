@@ -49,7 +49,7 @@ class Rope(System):
         Simulates the rope in :meth:`rollout`; started when it is first needed.
     features : {"voxels", "curtain", "vector"}, default="voxels"
         What :meth:`features` gives: bit-packed voxel grids, for the "voxnet" backend of the
-        classifier; or, for any estimator, what hangs below the band in 535 numbers, or thirteen
+        classifier; or, for any estimator, what hangs below the band in 791 numbers, or thirteen
         numbers.
 
     Raises
@@ -160,7 +160,7 @@ class Rope(System):
         -------
         X : ndarray of shape (n, n_features)
             With "voxels", uint8 of 12288 features: see
-            :func:`systems.rope_voxels.voxel_features`. With "curtain", float32 of 535: see
+            :func:`systems.rope_voxels.voxel_features`. With "curtain", float32 of 791: see
             :func:`systems.rope_curtain.curtain_features`. With "vector", float64 of 13: see
             :func:`systems.rope_features.vector_features`.
         """

@@ -10,13 +10,15 @@ from systems.rope_curtain_kernels import LEAST_SPAN, N_COLUMNS, N_ROWS, fill_cur
 from systems.rope_scene import STEP_SIZE, Scene
 from systems.rope_slice import slice_counts
 
-ASIDE = 0.05
+# To the left of the way from A to B, then to the right.
+TILTS = np.radians([90.0, 45.0, -45.0, -90.0])
 
+_UPRIGHT = np.zeros(1)
 _N_CELLS = N_COLUMNS * N_ROWS
 _N_LENGTHS = 4
 _CURTAINS = (0, _N_CELLS + _N_LENGTHS)
-_LEFT = 2 * (_N_CELLS + _N_LENGTHS)
-_RIGHT = _LEFT + _N_CELLS
+_FIRST_TILTED = 2 * (_N_CELLS + _N_LENGTHS)
+_TILTED = slice(_FIRST_TILTED, _FIRST_TILTED + len(TILTS) * _N_CELLS)
 
 
 def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array:
@@ -28,8 +30,9 @@ def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array
     columns along the band by 8 rows from the band down to a little below the rope, clipped to
     -0.05 and 0.15 m, in units of 0.05 m; each is followed by the distance between the grippers,
     the length of the band, the rise from gripper A to B and the depth of the rope, as shares of
-    the rope's length. Then come two more curtains after the transition, 0.05 m to the left of the
-    band, seen from A, and to the right; the parts of the slice between the grippers
+    the rope's length. A rope that rests on an edge drags behind its grippers, so then come four
+    curtains after the transition that are tilted aside, as much as ``TILTS`` to the left of the
+    way from A to B; the parts of the slice between the grippers
     (:func:`systems.rope_slice.slice_counts`); and the motion of the grippers in steps of 0.025 m:
     along the horizontal direction from A to B, across it, and up. The features are the same
     wherever the scene is put and however it is turned about the vertical.
@@ -41,18 +44,15 @@ def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array
 
     Returns
     -------
-    X : ndarray of float32 of shape (n, 535)
+    X : ndarray of float32 of shape (n, 791)
     """
     before = checked_bands(reduced, "reduced", scene)
     after = checked_bands(next_reduced, "next_reduced", scene, len(before))
-    rows = [
-        *_curtain_and_lengths(before, scene),
-        *_curtain_and_lengths(after, scene),
-        _curtains(after, ASIDE, scene)[0],
-        _curtains(after, -ASIDE, scene)[0],
-        slice_counts(before, after, scene),
-        _motion(before, after),
-    ]
+    upright_before, _, lengths_before = _curtains_and_lengths(before, _UPRIGHT, scene)
+    tilts = np.concatenate([_UPRIGHT, TILTS])
+    upright, tilted, lengths = _curtains_and_lengths(after, tilts, scene)
+    counts, motion = slice_counts(before, after, scene), _motion(before, after)
+    rows = [upright_before, lengths_before, upright, lengths, tilted, counts, motion]
     return np.hstack(rows).astype(np.float32)
 
 
@@ -60,15 +60,15 @@ def mirrored(features: Array) -> Array:
     """Return the features of the same transitions in a mirror that stands along the rope."""
     image = features.copy()
     image[:, [-5, -2]] *= -1.0
-    image[:, _LEFT : _RIGHT + _N_CELLS] = _sides_exchanged(features)
+    image[:, _TILTED] = _sides_exchanged(features)
     return image
 
 
 def reversed_ends(features: Array) -> Array:
     """Return the features of the same transitions with the names of the grippers exchanged."""
     image = features.copy()
-    image[:, _LEFT : _RIGHT + _N_CELLS] = _sides_exchanged(features)
-    for first in (*_CURTAINS, _LEFT, _RIGHT):
+    image[:, _TILTED] = _sides_exchanged(features)
+    for first in (*_CURTAINS, *range(_TILTED.start, _TILTED.stop, _N_CELLS)):
         cells = image[:, first : first + _N_CELLS].reshape(-1, N_COLUMNS, N_ROWS)
         image[:, first : first + _N_CELLS] = cells[:, ::-1].reshape(-1, _N_CELLS)
     image[:, [first + _N_CELLS + 2 for first in _CURTAINS]] *= -1.0
@@ -78,23 +78,19 @@ def reversed_ends(features: Array) -> Array:
 
 
 def _sides_exchanged(features: Array) -> Array:
-    left, right = features[:, _LEFT:_RIGHT], features[:, _RIGHT : _RIGHT + _N_CELLS]
-    return np.hstack([right, left])
+    tilted = features[:, _TILTED].reshape(len(features), len(TILTS), _N_CELLS)
+    return tilted[:, ::-1].reshape(len(features), len(TILTS) * _N_CELLS)
 
 
-def _curtain_and_lengths(rows: Array, scene: Scene) -> tuple[Array, Array]:
-    """Return the distances on curtains below bands, and the lengths of the bands."""
-    curtains, depths = _curtains(rows, 0.0, scene)
+def _curtains_and_lengths(rows: Array, tilts: Array, scene: Scene) -> tuple[Array, Array, Array]:
+    """Return the distances on the first curtain, on the others, and the lengths of the bands."""
+    curtains = np.empty((len(rows), len(tilts), N_COLUMNS, N_ROWS))
+    depths = np.empty(len(rows))
+    fill_curtains(rows, tilts, scene.packed, scene.rope_length, curtains, depths)
     rise = rows[:, 5] - rows[:, 2]
     lengths = np.column_stack([gripper_separation(rows), band_length(rows), rise, depths])
-    return curtains, lengths / scene.rope_length
-
-
-def _curtains(rows: Array, aside: float, scene: Scene) -> tuple[Array, Array]:
-    """Return the distances on curtains, and how deep the ropes hang."""
-    curtains, depths = np.empty((len(rows), _N_CELLS)), np.empty(len(rows))
-    fill_curtains(rows, aside, scene.packed, scene.rope_length, curtains, depths)
-    return curtains, depths
+    flat = curtains.reshape(len(rows), len(tilts) * _N_CELLS)
+    return flat[:, :_N_CELLS], flat[:, _N_CELLS:], lengths / scene.rope_length
 
 
 def _motion(before: Array, after: Array) -> Array:

@@ -38,12 +38,12 @@ def horizontal_length(row: Any, n: int) -> float:
 
 
 @njit(cache=True, nogil=True)
-def fill_curtain(row: Any, aside: float, packed: Any, rope_length: float, out: Any) -> float:
-    """Write clipped distances on a grid below a band; return how deep the rope hangs.
+def fill_curtain(row: Any, tilts: Any, packed: Any, rope_length: float, out: Any) -> float:
+    """Write clipped distances on grids that hang from a band; return how deep the rope hangs.
 
-    The grid may stand aside of the band, to the left of the way from A to B. Columns are evenly
-    spaced along the band's shadow. The rope hangs below the band by the parabola that it would
-    hang in if the band were straightened in a vertical plane.
+    A grid may be tilted to the left of the way from A to B, as a rope that drags behind hangs.
+    Columns are evenly spaced along the band's shadow. The rope hangs by the parabola that it
+    would hang in if the band were straightened in a vertical plane.
     """
     n = n_points(row)
     shadow = horizontal_length(row, n)
@@ -51,7 +51,7 @@ def fill_curtain(row: Any, aside: float, packed: Any, rope_length: float, out: A
     bend = 0.0
     if rope_length * rope_length > width * width + rise * rise:
         bend = parabola_bend(width, rise, rope_length)
-    dx, dy = _leftwards(row, aside)
+    left_x, left_y = _leftwards(row)
     i, travelled, segment = 0, 0.0, shadow_length(row, 0)
     for column in range(N_COLUMNS):
         at = (column + 0.5) / N_COLUMNS
@@ -61,30 +61,34 @@ def fill_curtain(row: Any, aside: float, packed: Any, rope_length: float, out: A
             segment = shadow_length(row, i)
         ratio = (at * shadow - travelled) / segment if segment > 1e-12 else at
         ratio = min(1.0, max(0.0, ratio))
-        px = dx + row[6 + 3 * i] + ratio * (row[9 + 3 * i] - row[6 + 3 * i])
-        py = dy + row[7 + 3 * i] + ratio * (row[10 + 3 * i] - row[7 + 3 * i])
+        px = row[6 + 3 * i] + ratio * (row[9 + 3 * i] - row[6 + 3 * i])
+        py = row[7 + 3 * i] + ratio * (row[10 + 3 * i] - row[7 + 3 * i])
         pz = row[8 + 3 * i] + ratio * (row[11 + 3 * i] - row[8 + 3 * i])
         sag = bend * width * width * at * (1.0 - at)
-        for j in range(N_ROWS):
-            d = distance(px, py, pz - DEPTH * sag * (j + 1) / N_ROWS, packed)
-            out[column * N_ROWS + j] = min(FARTHEST, max(NEAREST, d)) / UNIT
+        for k in range(tilts.shape[0]):
+            aside, down = np.sin(tilts[k]), np.cos(tilts[k])
+            for j in range(N_ROWS):
+                away = DEPTH * sag * (j + 1) / N_ROWS
+                x, y = px + aside * away * left_x, py + aside * away * left_y
+                d = distance(x, y, pz - down * away, packed)
+                out[k, column, j] = min(FARTHEST, max(NEAREST, d)) / UNIT
     return 0.25 * bend * width * width
 
 
 @njit(cache=True, nogil=True)
-def _leftwards(row: Any, aside: float) -> Any:
-    """Return ``aside`` times the horizontal direction to the left of the way from A to B."""
+def _leftwards(row: Any) -> Any:
+    """Return the horizontal direction to the left of the way from A to B."""
     x, y = row[3] - row[0], row[4] - row[1]
     length = np.sqrt(x * x + y * y)
     if length > LEAST_SPAN:
-        return -aside * y / length, aside * x / length
-    return 0.0, aside
+        return -y / length, x / length
+    return 0.0, 1.0
 
 
 @njit(cache=True, nogil=True)
 def fill_curtains(
-    rows: Any, aside: float, packed: Any, rope_length: float, out: Any, depths: Any
+    rows: Any, tilts: Any, packed: Any, rope_length: float, out: Any, depths: Any
 ) -> None:
-    """Write the curtain of each row, and how deep its rope hangs."""
+    """Write the curtains of each row, and how deep its rope hangs."""
     for i in range(rows.shape[0]):
-        depths[i] = fill_curtain(rows[i], aside, packed, rope_length, out[i])
+        depths[i] = fill_curtain(rows[i], tilts, packed, rope_length, out[i])

@@ -14,9 +14,8 @@ from systems.rope_features import vector_features
 
 N_COLUMNS, N_ROWS, DEPTH = 16, 8, 1.2
 N_CELLS = N_COLUMNS * N_ROWS
-BEFORE, AFTER, LEFT, RIGHT, COUNTS, MOTION = np.cumsum(
-    [0, N_CELLS + 4, N_CELLS + 4, N_CELLS, N_CELLS, 9]
-)
+TILTS = np.radians([90, 45, -45, -90])
+BEFORE, AFTER, TILTED, COUNTS, MOTION = np.cumsum([0, N_CELLS + 4, N_CELLS + 4, 4 * N_CELLS, 9])
 
 
 def states_of(rope, seed=0):
@@ -39,10 +38,9 @@ def bend_of(width, rise, length):
     return brentq(excess, 0.0, 1e4) if excess(0.0) < 0 else 0.0
 
 
-def reference_curtain(row, scene, aside=0.0):
-    points = band_points(row).copy()
+def reference_curtain(row, scene, tilt=0.0):
+    points = band_points(row)
     along = (row[3:5] - row[:2]) / np.linalg.norm(row[3:5] - row[:2])
-    points[:, :2] += aside * np.array([-along[1], along[0]])
     shadow = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1)
     travelled = np.concatenate([[0.0], np.cumsum(shadow)])
     width, rise = travelled[-1], points[-1, 2] - points[0, 2]
@@ -52,7 +50,8 @@ def reference_curtain(row, scene, aside=0.0):
     sag = bend * width**2 * at * (1 - at)
     share = DEPTH * np.arange(1, N_ROWS + 1) / N_ROWS
     samples = np.repeat(on_band[:, None], N_ROWS, axis=1)
-    samples[..., 2] -= sag[:, None] * share
+    away = np.array([-along[1] * np.sin(tilt), along[0] * np.sin(tilt), -np.cos(tilt)])
+    samples += (sag[:, None] * share)[..., None] * away
     distances = signed_distance(samples.reshape(-1, 3), scene.packed)
     return np.clip(distances, -0.05, 0.15) / 0.05, bend * width**2 / 4
 
@@ -76,10 +75,10 @@ def test_it_agrees_with_a_plain_reference(name):
             rows[i, N_CELLS:AFTER], np.divide(lengths, rope.scene.rope_length), atol=1e-5
         )
     for i, state in enumerate(after):
-        for first, aside in ((LEFT, 0.05), (RIGHT, -0.05)):
-            expected, _ = reference_curtain(state, rope.scene, aside)
+        for first, tilt in zip(range(TILTED, COUNTS, N_CELLS), TILTS, strict=True):
+            expected, _ = reference_curtain(state, rope.scene, tilt)
             np.testing.assert_allclose(rows[i, first : first + N_CELLS], expected, atol=1e-4)
-    np.testing.assert_array_equal(rows[:, AFTER:LEFT], rope.features(after, after)[:, :AFTER])
+    np.testing.assert_array_equal(rows[:, AFTER:TILTED], rope.features(after, after)[:, :AFTER])
     vectors = vector_features(before, after, rope.scene)
     np.testing.assert_array_equal(rows[:, COUNTS:MOTION], vectors[:, 4:])
 
