@@ -62,7 +62,7 @@ def _draw_scene(rng: np.random.Generator) -> Scene:
     slotted = _slotted_wall(rng, half_width) if rng.random() < SHARE_WITH_SLOT else []
     if wall is not None:
         obstacles += wall.obstacles(half_width, at_slot=bool(slotted))
-    obstacles += hooks + slotted
+    obstacles += [*hooks, *slotted]
     if wall is not None and slotted and rng.random() < SHARE_GUARDED:
         obstacles.append(_guard(rng, wall_x, slot_y=float(slotted[0].center[1])))
     return Scene(
