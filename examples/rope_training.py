@@ -32,6 +32,8 @@ ROUNDS = (
     Round(range(10_000, 11_200), biased=False),
     Round(range(11_200, 11_400), biased=True),
     Round(range(12_200, 12_400), biased=True),
+    Round(range(13_000, 18_500), biased=True, slotted=True),
+    Round(range(18_600, 20_600), biased=True, slotted=True),
 )
 # Transitions of a plan that ours learns from after the rope was first caught: about 0.4 m.
 N_AFTER = 15
