@@ -59,10 +59,10 @@ class RopeFromItsStart(Rope):
 
 @dataclass(frozen=True)
 class Round:
-    """Which random scenes to plan in, whether with a classifier, and whether only in slits.
+    """Which random scenes to plan in, whether with a classifier, and whether only in slotted ones.
 
     Few random scenes pull the rope through a slot and a slit at once. There it rests on an edge and
-    drags behind, and so needs examples of its own.
+    drags behind, which needs examples of its own.
     """
 
     scenes: range
@@ -88,11 +88,7 @@ def collect_random_scenes(
     n_jobs : int
     """
     folder.mkdir(parents=True, exist_ok=True)
-    tasks = (
-        joblib.delayed(_collect_scene)(folder, i, plan.biased, estimator)
-        for i in plan.scenes
-        if not plan.slotted or _is_slotted(random_scene(i))
-    )
+    tasks = (joblib.delayed(_collect_scene)(folder, i, plan, estimator) for i in plan.scenes)
     found = joblib.Parallel(n_jobs=n_jobs, verbose=5)(tasks)
     return [data for data in found if data is not None]
 
@@ -106,17 +102,17 @@ def _is_slotted(scene: Scene) -> bool:
     return {"lower slotted wall", "lower wall"} <= {obstacle.name for obstacle in scene.obstacles}
 
 
-def _collect_scene(folder: Path, i: int, biased: bool, estimator: Any) -> SceneData | None:
+def _collect_scene(folder: Path, i: int, plan: Round, estimator: Any) -> SceneData | None:
     rope = RopeFromItsStart(random_scene(i), features="curtain")
     file, empty = folder / f"scene-{i:05d}.npz", folder / f"scene-{i:05d}.empty"
-    if empty.exists():
+    if empty.exists() or (plan.slotted and not _is_slotted(rope.scene)):
         return None
     if not file.exists():
         first = _plans_from_start(rope, None, 1, i)
         if first is None or first.y[-1] == RELIABLE:
             empty.touch()
             return None
-        others = _plans_from_start(rope, estimator if biased else None, N_MORE, i)
+        others = _plans_from_start(rope, estimator if plan.biased else None, N_MORE, i)
         if others is not None:
             others.plan += 1
         Transitions.concatenate([first] if others is None else [first, others]).save(file)
