@@ -19,7 +19,7 @@ import matplotlib.image
 import numpy as np
 from PIL import Image
 
-from planners import BiasedRRT, PlanResult
+from planners import BiasedRRT
 from reliability import load_estimator
 from systems import Problem, Rollout, Rope
 from systems.band import band_points
@@ -36,9 +36,9 @@ MILLISECONDS_PER_FRAME = 120
 
 @dataclass(frozen=True)
 class Trial:
-    """A plan and what became of it."""
+    """The bands of a plan, and what became of it."""
 
-    plan: PlanResult
+    bands: np.ndarray
     rollout: Rollout
     success: bool
 
@@ -68,7 +68,7 @@ def main(arguments: list[str] | None = None) -> None:
     width, height = options.size
     # Pictures come first: MuJoCo has to learn how to draw when it is imported.
     with ScenePictures(rope.scene, width=width, height=height) as pictures:
-        caught, worked = compare(rope, rope.scene_problem(), estimator, options.plans)
+        caught, worked = compare(rope, estimator, options.plans)
         for name, trial in (("caught", caught), ("worked", worked)):
             if trial is not None:
                 draw_moments(pictures, trial, folder / f"{name}.png")
@@ -77,15 +77,13 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"Pictures are in {folder}.")
 
 
-def compare(
-    rope: Rope, problem: Problem, estimator: Any, n_plans: int
-) -> tuple[Trial | None, Trial | None]:
+def compare(rope: Rope, estimator: Any, n_plans: int) -> tuple[Trial | None, Trial | None]:
     """Plan both ways, seed by seed, until one was caught without and one worked with it."""
     caught = worked = None
-    start = rope.reduce(problem.start)
+    problem, plain_rope = rope.scene_problem(), Rope(rope.scene, rope.engine)
     for seed in range(n_plans):
-        without = attempt(rope, problem, start, None, seed)
-        with_it = attempt(rope, problem, start, estimator, seed)
+        without = attempt(plain_rope, problem, None, seed)
+        with_it = attempt(rope, problem, estimator, seed)
         if caught is None and without is not None and not without.success:
             caught = without
         if worked is None and with_it is not None and with_it.success:
@@ -97,15 +95,13 @@ def compare(
     return caught, worked
 
 
-def attempt(
-    rope: Rope, problem: Problem, start: np.ndarray, estimator: Any, seed: int
-) -> Trial | None:
+def attempt(rope: Rope, problem: Problem, estimator: Any, seed: int) -> Trial | None:
     """Plan, execute and tell; None without a plan."""
     name = "without a classifier" if estimator is None else "with the classifier"
     planner = BiasedRRT(
         rope, estimator, k=K, max_iterations=10**6, time_limit=TIME_LIMIT, random_state=seed
     )
-    plan = planner.plan(start, problem.goal)
+    plan = planner.plan(rope.reduce(problem.start), problem.goal)
     if not plan.success:
         print(f"seed {seed}, {name}: {plan.status.value}")
         return None
@@ -116,7 +112,7 @@ def attempt(
         f"{plan.simplification_time:.1f} s to {len(plan.commands)} transitions. "
         f"{rollout.stop_reason.value}"
     )
-    return Trial(plan, rollout, success)
+    return Trial(rope.bands(plan.reduced), rollout, success)
 
 
 def draw_moments(pictures: ScenePictures, trial: Trial, path: Path) -> None:
@@ -148,7 +144,7 @@ def animate(pictures: ScenePictures, trials: tuple[Trial, Trial], path: Path) ->
 
 def draw(pictures: ScenePictures, trial: Trial, moment: int) -> np.ndarray:
     """Draw the rope at a moment, and the band that was planned for it."""
-    band = band_points(trial.plan.reduced[moment])
+    band = band_points(trial.bands[moment])
     nodes = trial.rollout.states[moment].nodes
     return pictures.render([(nodes, ROPE_COLOR), (band, BAND_COLOR)])
 

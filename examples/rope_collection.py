@@ -28,7 +28,7 @@ K = 10.0
 
 @dataclass(frozen=True)
 class SceneData:
-    """Transitions of one scene."""
+    """Transitions of one scene, whose reduced states carry loose ropes."""
 
     scene: Scene
     transitions: Transitions
@@ -36,7 +36,7 @@ class SceneData:
 
 def collect_simple_hook(folder: Path, n_plans: int, n_jobs: int) -> SceneData:
     """Collect as the paper does: one scene, many starts, no classifier."""
-    rope = Rope("simple_hook")
+    rope = Rope("simple_hook", features="curtain")
     transitions = collect_transitions(
         rope,
         BiasedRRT(rope, max_iterations=PAPER_ITERATIONS),
@@ -135,8 +135,15 @@ def described(parts: Sequence[SceneData], kind: str) -> tuple[np.ndarray, np.nda
     """Return the features, labels and plans of all parts; plan ids differ between scenes."""
     rows, labels, plans, first = [], [], [], 0
     for part in parts:
-        rows.append(part.transitions.features(Rope(part.scene, features=kind)))
+        transitions = part.transitions if kind == "curtain" else _of_bands(part)
+        rows.append(transitions.features(Rope(part.scene, features=kind)))
         labels.append(part.transitions.y)
         plans.append(part.transitions.plan + first)
         first = int(plans[-1].max()) + 1
     return np.concatenate(rows), np.concatenate(labels), np.concatenate(plans)
+
+
+def _of_bands(part: SceneData) -> Transitions:
+    rope, data = Rope(part.scene, features="curtain"), part.transitions
+    before, after = rope.bands(data.reduced), rope.bands(data.next_reduced)
+    return Transitions(before, data.command, after, data.y, data.plan, data.step)

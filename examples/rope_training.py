@@ -34,8 +34,12 @@ ROUNDS = (
     Round(range(12_200, 12_400), biased=True),
     Round(range(13_000, 18_500), biased=True, slotted=True),
     Round(range(18_600, 20_600), biased=True, slotted=True),
+    Round(range(22_000, 23_600), biased=True, slotted=True),
+    Round(range(60_000, 61_600), biased=True, slotted=True),
+    Round(range(62_000, 63_450), biased=True, slotted=True),
+    Round(range(130_000, 132_000), biased=True, slotted=True),
 )
-# Transitions of a plan that ours learns from after the rope was first caught: about 0.4 m.
+# Transitions of a plan that ours learns from after the rope was caught for good: about 0.4 m.
 N_AFTER = 15
 # Each call of a tree costs as much as a few rows: a few large trees plan faster than many.
 N_TREES = 40
@@ -117,17 +121,17 @@ def train_vector(simple_hook: SceneData) -> Any:
 
 def train_ours(simple_hook: SceneData, folder: Path, n_jobs: int) -> Any:
     """Train gradient boosting on curtains, round by round, and hold out whole plans and scenes."""
-    parts, classifier = [up_to_first_mistake(simple_hook)], None
+    parts, classifier = [up_to_last_mistake(simple_hook)], None
     for i, plan in enumerate(ROUNDS):
         found = collect_random_scenes(folder / f"random{i}", plan, classifier, n_jobs)
-        parts += map(up_to_first_mistake, found)
+        parts += map(up_to_last_mistake, found)
         classifier = fit_curtains(parts)
     return classifier
 
 
-def up_to_first_mistake(part: SceneData) -> SceneData:
-    """Leave out what plans did long after the rope was caught."""
-    return SceneData(part.scene, part.transitions.up_to_first_mistake(N_AFTER))
+def up_to_last_mistake(part: SceneData) -> SceneData:
+    """Leave out what plans did long after the rope was caught for good."""
+    return SceneData(part.scene, part.transitions.up_to_last_mistake(N_AFTER))
 
 
 def fit_curtains(parts: Sequence[SceneData]) -> Any:

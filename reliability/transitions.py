@@ -109,16 +109,16 @@ class Transitions:
         states = self._states.take(pairs[kept])
         return self._of_states(states, _first_states(follows_on), columns)
 
-    def up_to_first_mistake(self, n_after: int) -> Transitions:
-        """Leave out what each plan did long after its execution went astray.
+    def up_to_last_mistake(self, n_after: int) -> Transitions:
+        """Leave out what each plan did long after its execution went astray for good.
 
-        Once the execution has diverged, all that follows is Unreliable, whatever it is: it says
-        where executions are that went wrong before, and not what makes them go wrong.
+        From the mistake on that an execution never recovers from, all is Unreliable, whatever it
+        is: it says where executions are that went wrong before, and not what makes them go wrong.
 
         Parameters
         ----------
         n_after : int
-            Unreliable transitions to keep of each plan, from the first one on.
+            Transitions to keep of those that end a plan and are all Unreliable, the first ones.
 
         Returns
         -------
@@ -126,9 +126,9 @@ class Transitions:
         """
         check_count(n_after, "n_after")
         _, plan = np.unique(self.plan, return_inverse=True)
-        first = np.full(plan.max(initial=-1) + 1, np.inf)
-        np.minimum.at(first, plan, np.where(self.y == UNRELIABLE, self.step, np.inf))
-        return self[self.step < first[plan] + n_after]
+        last = np.full(plan.max(initial=-1) + 1, -1)
+        np.maximum.at(last, plan, np.where(self.y == RELIABLE, self.step, -1))
+        return self[self.step <= last[plan] + n_after]
 
     @classmethod
     def concatenate(cls, parts: Sequence[Transitions]) -> Transitions:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.band import WORKSPACE_SHAPE, bands_close, reduce_rope, reduced_dim
 from systems.distance import signed_distance
+from systems.loose_rope import loose_dim, loose_rope_at_rest, propagate_loose_ropes
 from systems.rope_features import FEATURES
 from systems.rope_kernels import all_finite, fill_margins, propagate_rope_rows, steer_rows
 from systems.rope_rollout import ENGINES, RopeRollout, rope_length
@@ -38,7 +39,8 @@ class Rope(System):
 
     True states are :class:`systems.rope_state.RopeState`. A reduced state is the positions of
     grippers A and B, which are its configuration, and then the points of the elastic band from A
-    to B (see :mod:`systems.band`); commands are displacements of A and B, together no more than
+    to B (see :mod:`systems.band`); with ``features="curtain"`` a guess at the rope itself follows
+    (see :mod:`systems.loose_rope`). Commands are displacements of A and B, together no more than
     ``step_size``. All are metres in the world frame, z up.
 
     Parameters
@@ -49,7 +51,7 @@ class Rope(System):
         Simulates the rope in :meth:`rollout`; started when it is first needed.
     features : {"voxels", "curtain", "vector"}, default="voxels"
         What :meth:`features` gives: bit-packed voxel grids, for the "voxnet" backend of the
-        classifier; or, for any estimator, what hangs below the band in 791 numbers, or thirteen
+        classifier; or, for any estimator, what hangs below the band in 319 numbers, or thirteen
         numbers.
 
     Raises
@@ -86,13 +88,15 @@ class Rope(System):
             self.feature_kind = features
         self.scene = scene
         self.engine = engine
-        self.reduced_dim = reduced_dim(scene)
+        self._band_dim = self.reduced_dim = reduced_dim(scene)
+        if features == "curtain":
+            self.reduced_dim += loose_dim(scene)
         self.bounds = np.tile(scene.bounds, 2)
         self._packed = scene.packed
         self._execution = RopeRollout(scene, engine)
 
     def reduce(self, state: RopeState) -> Array:
-        """Pull the rope taut: r.
+        """Pull the rope taut: r. A loose rope is then where the rope is, and at rest.
 
         Raises
         ------
@@ -100,30 +104,42 @@ class Rope(System):
             If the rope passes through an obstacle.
         """
         _check_state(state)
-        return reduce_rope(state.nodes, state.grippers, self.scene)
+        band = reduce_rope(state.nodes, state.grippers, self.scene)
+        if not self._carries_loose_rope:
+            return band
+        return np.concatenate([band, loose_rope_at_rest(state.nodes)])
 
     def propagate(self, reduced: Array, command: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Move the ends of bands and let the bands contract: g.
 
         A successor keeps the grippers 0.03 m away from the obstacles, the world's bounds and one
         another; grippers that are nearer may not come nearer still. And its band is not
-        overstretched. What costs least is checked first.
+        overstretched; a loose rope may be. What costs least is checked first.
         """
         rows = self._as_rows(reduced, "reduced", self.reduced_dim)
         moves = self._as_rows(command, "command", 6, len(rows))
-        next_reduced, valid = np.empty_like(rows), np.empty(len(rows), dtype=np.bool_)
+        bands = self.bands(rows)
+        next_bands, valid = np.empty_like(bands), np.empty(len(rows), dtype=np.bool_)
         propagate_rope_rows(
-            rows,
+            bands,
             moves,
             self.bounds,
             self._packed,
             GRIPPER_CLEARANCE,
             self.scene.max_band_length,
             np.empty(WORKSPACE_SHAPE),
-            next_reduced,
+            next_bands,
             valid,
         )
-        return next_reduced, valid
+        if not self._carries_loose_rope:
+            return next_bands, valid
+        loose = np.ascontiguousarray(rows[:, self._band_dim :])
+        next_loose = propagate_loose_ropes(loose, bands[:, :6], moves, valid, self.scene)
+        return np.hstack([next_bands, next_loose]), valid
+
+    def bands(self, reduced: Array) -> Array:
+        """Return reduced states without the loose ropes, for :mod:`systems.band`."""
+        return np.ascontiguousarray(reduced[:, : self._band_dim])
 
     def steer(self, reduced: Array, configuration: Array) -> Array:
         """Return the displacement of at most one step, in R^6, towards gripper positions."""
@@ -151,7 +167,7 @@ class Rope(System):
 
     def close(self, predicted: Array, executed: Array) -> NDArray[np.bool_]:
         """Say whether bands are near one another and of one homotopy class: Close."""
-        return bands_close(predicted, executed, self.scene)
+        return bands_close(self.bands(predicted), self.bands(executed), self.scene)
 
     def features(self, reduced: Array, next_reduced: Array) -> NDArray[Any]:
         """Describe transitions to an estimator.
@@ -160,7 +176,7 @@ class Rope(System):
         -------
         X : ndarray of shape (n, n_features)
             With "voxels", uint8 of 12288 features: see
-            :func:`systems.rope_voxels.voxel_features`. With "curtain", float32 of 791: see
+            :func:`systems.rope_voxels.voxel_features`. With "curtain", float32 of 319: see
             :func:`systems.rope_curtain.curtain_features`. With "vector", float64 of 13: see
             :func:`systems.rope_features.vector_features`.
         """
@@ -205,6 +221,10 @@ class Rope(System):
         _check_state(state)
         goals = as_finite_array(goal, "goal", (None, 6))
         return bool((np.linalg.norm(goals - state.grippers.ravel(), axis=1) <= tolerance).any())
+
+    @property
+    def _carries_loose_rope(self) -> bool:
+        return self.reduced_dim > self._band_dim
 
     def _goal(self) -> Array:
         return self.scene.goal.reshape(1, 6).copy()

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from systems.band import band_length, checked_bands, gripper_separation
+from systems.band import band_length, gripper_separation, reduced_dim
+from systems.loose_rope import loose_dim
 from systems.obstacles import Array
-from systems.rope_curtain_kernels import LEAST_SPAN, N_COLUMNS, N_ROWS, fill_curtains
+from systems.rope_curtain_kernels import (
+    LEAST_SPAN,
+    N_COLUMNS,
+    N_ROWS,
+    fill_curtains,
+    fill_depths,
+    fill_sheets,
+)
 from systems.rope_scene import STEP_SIZE, Scene
-from systems.rope_slice import slice_counts
+from systems.validation import as_finite_array
 
-# To the left of the way from A to B, then to the right.
-TILTS = np.radians([90.0, 45.0, -45.0, -90.0])
-
-_UPRIGHT = np.zeros(1)
 _N_CELLS = N_COLUMNS * N_ROWS
 _N_LENGTHS = 4
-_CURTAINS = (0, _N_CELLS + _N_LENGTHS)
-_FIRST_TILTED = 2 * (_N_CELLS + _N_LENGTHS)
-_TILTED = slice(_FIRST_TILTED, _FIRST_TILTED + len(TILTS) * _N_CELLS)
+_RISES = [2, 6]
+_CURTAIN = 2 * _N_LENGTHS
+_SHEET = _CURTAIN + _N_CELLS
+_OFFSETS = slice(_SHEET + _N_CELLS, _SHEET + _N_CELLS + 3 * N_COLUMNS)
 
 
 def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array:
@@ -26,71 +31,87 @@ def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array
 
     The band forgets how the rope hangs, and yet the length of the rope implies it: below the
     band, as deep as the slack lets it. What catches the rope goes through this curtain. Before
-    and after the transition, the signed distance to the obstacles is taken on a grid of 16
-    columns along the band by 8 rows from the band down to a little below the rope, clipped to
-    -0.05 and 0.15 m, in units of 0.05 m; each is followed by the distance between the grippers,
-    the length of the band, the rise from gripper A to B and the depth of the rope, as shares of
-    the rope's length. A rope that rests on an edge drags behind its grippers, so then come four
-    curtains after the transition that are tilted aside, as much as ``TILTS`` to the left of the
-    way from A to B; the parts of the slice between the grippers
-    (:func:`systems.rope_slice.slice_counts`); and the motion of the grippers in steps of 0.025 m:
-    along the horizontal direction from A to B, across it, and up. The features are the same
-    wherever the scene is put and however it is turned about the vertical.
+    and after the transition come the distance between the grippers, the length of the band, the
+    rise from gripper A to B and the depth of the rope, as shares of the rope's length; then,
+    after it, the signed distance to the obstacles on a grid of 16 columns along the band by 8
+    rows from the band down to a little below the rope, clipped to -0.05 and 0.15 m, in units of
+    0.05 m. A rope that rests on an edge drags behind its grippers, so then come such a grid from
+    the band towards the loose rope (see :mod:`systems.loose_rope`) and a little beyond; the way
+    from band to loose rope in its 16 columns, in the same units, along the horizontal direction
+    from A to B, to the left of it, and up; the length of the loose rope as a share of the longest
+    that is allowed; and the motion of the grippers in steps of 0.025 m: along, to the left, and
+    up. The features are the same wherever the scene is put and however it is turned about the
+    vertical.
 
     Parameters
     ----------
     reduced, next_reduced : ndarray of shape (n, reduced_dim)
+        Of a ``Rope`` with ``features="curtain"``: bands, and after them loose ropes.
     scene : Scene
 
     Returns
     -------
-    X : ndarray of float32 of shape (n, 791)
+    X : ndarray of float32 of shape (n, 319)
     """
-    before = checked_bands(reduced, "reduced", scene)
-    after = checked_bands(next_reduced, "next_reduced", scene, len(before))
-    upright_before, _, lengths_before = _curtains_and_lengths(before, _UPRIGHT, scene)
-    tilts = np.concatenate([_UPRIGHT, TILTS])
-    upright, tilted, lengths = _curtains_and_lengths(after, tilts, scene)
-    counts, motion = slice_counts(before, after, scene), _motion(before, after)
-    rows = [upright_before, lengths_before, upright, lengths, tilted, counts, motion]
+    before, _ = _checked_parts(reduced, "reduced", scene)
+    after, loose = _checked_parts(next_reduced, "next_reduced", scene, len(before))
+    curtains, depths = np.empty((len(after), N_COLUMNS, N_ROWS)), np.empty((2, len(after)))
+    fill_depths(before, scene.rope_length, depths[0])
+    fill_curtains(after, scene.packed, scene.rope_length, curtains, depths[1])
+    rows = [
+        _lengths(before, depths[0], scene),
+        _lengths(after, depths[1], scene),
+        curtains.reshape(len(after), _N_CELLS),
+        _sheets(after, loose, scene),
+        _motion(before, after),
+    ]
     return np.hstack(rows).astype(np.float32)
 
 
 def mirrored(features: Array) -> Array:
     """Return the features of the same transitions in a mirror that stands along the rope."""
     image = features.copy()
-    image[:, [-5, -2]] *= -1.0
-    image[:, _TILTED] = _sides_exchanged(features)
+    image[:, [*range(_OFFSETS.start + 1, _OFFSETS.stop, 3), -5, -2]] *= -1.0
     return image
 
 
 def reversed_ends(features: Array) -> Array:
     """Return the features of the same transitions with the names of the grippers exchanged."""
     image = features.copy()
-    image[:, _TILTED] = _sides_exchanged(features)
-    for first in (*_CURTAINS, *range(_TILTED.start, _TILTED.stop, _N_CELLS)):
+    for first in (_CURTAIN, _SHEET):
         cells = image[:, first : first + _N_CELLS].reshape(-1, N_COLUMNS, N_ROWS)
         image[:, first : first + _N_CELLS] = cells[:, ::-1].reshape(-1, _N_CELLS)
-    image[:, [first + _N_CELLS + 2 for first in _CURTAINS]] *= -1.0
+    image[:, _RISES] *= -1.0
     turned = np.array([-1.0, -1.0, 1.0], dtype=features.dtype)
+    offsets = image[:, _OFFSETS].reshape(-1, N_COLUMNS, 3)
+    image[:, _OFFSETS] = (offsets[:, ::-1] * turned).reshape(-1, 3 * N_COLUMNS)
     image[:, -6:-3], image[:, -3:] = features[:, -3:] * turned, features[:, -6:-3] * turned
     return image
 
 
-def _sides_exchanged(features: Array) -> Array:
-    tilted = features[:, _TILTED].reshape(len(features), len(TILTS), _N_CELLS)
-    return tilted[:, ::-1].reshape(len(features), len(TILTS) * _N_CELLS)
+def _checked_parts(
+    rows: Array, name: str, scene: Scene, n_rows: int | None = None
+) -> tuple[Array, Array]:
+    """Return bands and loose ropes as the kernels read them."""
+    width = reduced_dim(scene)
+    rows = as_finite_array(rows, name, (n_rows, width + loose_dim(scene)))
+    return np.ascontiguousarray(rows[:, :width]), np.ascontiguousarray(rows[:, width:])
 
 
-def _curtains_and_lengths(rows: Array, tilts: Array, scene: Scene) -> tuple[Array, Array, Array]:
-    """Return the distances on the first curtain, on the others, and the lengths of the bands."""
-    curtains = np.empty((len(rows), len(tilts), N_COLUMNS, N_ROWS))
-    depths = np.empty(len(rows))
-    fill_curtains(rows, tilts, scene.packed, scene.rope_length, curtains, depths)
-    rise = rows[:, 5] - rows[:, 2]
-    lengths = np.column_stack([gripper_separation(rows), band_length(rows), rise, depths])
-    flat = curtains.reshape(len(rows), len(tilts) * _N_CELLS)
-    return flat[:, :_N_CELLS], flat[:, _N_CELLS:], lengths / scene.rope_length
+def _lengths(bands: Array, depths: Array, scene: Scene) -> Array:
+    rise = bands[:, 5] - bands[:, 2]
+    lengths = np.column_stack([gripper_separation(bands), band_length(bands), rise, depths])
+    return lengths / scene.rope_length
+
+
+def _sheets(bands: Array, loose: Array, scene: Scene) -> Array:
+    """Return the distances between bands and loose ropes, the ways, and the ropes' lengths."""
+    n = len(bands)
+    sheets, offsets = np.empty((n, N_COLUMNS, N_ROWS)), np.empty((n, N_COLUMNS, 3))
+    lengths = np.empty(n)
+    fill_sheets(bands, loose, scene.n_nodes, scene.packed, sheets, offsets, lengths)
+    flat = sheets.reshape(n, _N_CELLS), offsets.reshape(n, 3 * N_COLUMNS)
+    return np.hstack([*flat, lengths[:, None] / scene.max_band_length])
 
 
 def _motion(before: Array, after: Array) -> Array:

@@ -149,18 +149,18 @@ def test_labels_are_one_and_zero():
     assert (RELIABLE, UNRELIABLE) == (1, 0)
 
 
-def test_what_plans_did_long_after_their_first_mistake_is_left_out():
-    y = np.array([1, 0, 1, 0, 0, 0, 1, 1, 0, 1])
-    plan = np.array([7, 7, 7, 7, 7, 3, 3, 5, 5, 5])
-    step = np.array([0, 1, 2, 3, 4, 0, 1, 0, 1, 2])
+def test_what_plans_did_long_after_they_went_wrong_for_good_is_left_out():
+    y = np.array([1, 0, 1, 0, 0, 0, 1, 1, 0, 0, 0, 0])
+    plan = np.array([7, 7, 7, 7, 7, 7, 3, 5, 5, 5, 2, 2])
+    step = np.array([0, 1, 2, 3, 4, 5, 0, 0, 1, 2, 0, 1])
     order = np.random.default_rng(0).permutation(len(y))
-    rows = np.arange(10.0)[order, None]
+    rows = np.arange(12.0)[order, None]
     data = Transitions(rows, rows, rows, y[order], plan[order], step[order])
-    for n_after, expected in ((1, [0, 1, 5, 7, 8]), (2, [0, 1, 2, 5, 6, 7, 8, 9])):
-        kept = data.up_to_first_mistake(n_after).reduced[:, 0]
-        np.testing.assert_array_equal(np.sort(kept), expected)
+    for n_after, left_out in ((1, [4, 5, 9, 11]), (2, [5])):
+        kept = data.up_to_last_mistake(n_after).reduced[:, 0]
+        np.testing.assert_array_equal(np.sort(kept), np.delete(np.arange(12), left_out))
     all_reliable = data[data.y == RELIABLE]
-    assert len(all_reliable.up_to_first_mistake(1)) == len(all_reliable)
-    assert len(data[:0].up_to_first_mistake(1)) == 0
+    assert len(all_reliable.up_to_last_mistake(1)) == len(all_reliable)
+    assert len(data[:0].up_to_last_mistake(1)) == 0
     with pytest.raises(ValueError, match="n_after must be"):
-        data.up_to_first_mistake(0)
+        data.up_to_last_mistake(0)
