@@ -2,8 +2,8 @@
 
 The band forgets where the slack is; a loose rope remembers. Its nodes fall, its links go slack
 but do not stretch, and where it rests it rubs: position-based dynamics, for about a tenth of what
-MuJoCo takes (``benchmarks/rope_engines.py``). It errs by a centimetre or two, and now and then about what the rope gets
-caught on, so what it says is a feature to learn from and no verdict.
+MuJoCo takes (``benchmarks/rope_engines.py``). It errs by a centimetre or two, and now and then
+about what the rope gets caught on, so what it says is a feature to learn from and no verdict.
 
 It is a row of ``loose_dim(scene)`` numbers: the nodes between the grippers from A to B, metres in
 the world frame, and then how far each of them moved in the last of the steps that every command

@@ -10,11 +10,12 @@ from numba import njit
 from systems.distance_kernels import gradient, nearest_obstacle
 from systems.rope_scene import ROPE_RADIUS
 
+# Strides and steps are those of Γ. What gravity adds to a free node's displacement from step to
+# step, in metres, and the share of it that is kept, are MuJoCo's: 4 m/s² times 5 ms squared, and
+# 0.95 every other step. Friction and sweeps fit the nodes of executions in random scenes.
 LONGEST_STRIDE = 0.005
 STEPS_PER_STRIDE = 2
 RESTING_STEPS = 4
-# What gravity adds to a free node's displacement from step to step, in metres, and the share of
-# the displacement that is kept.
 FALL = 1e-4
 KEPT = 0.975
 FRICTION = 0.25
