@@ -1,13 +1,15 @@
-"""The loose rope: a cheap guess at how the rope itself hangs, carried beside the band.
+"""Loose ropes: cheap guesses at how the rope itself hangs, carried beside the band.
 
 The band forgets where the slack is; a loose rope remembers. Its nodes fall, its links go slack
-but do not stretch, and where it rests it rubs: position-based dynamics, for about a tenth of what
-MuJoCo takes (``benchmarks/rope_engines.py``). It errs by a centimetre or two, and now and then
-about what the rope gets caught on, so what it says is a feature to learn from and no verdict.
+but do not stretch, and where it rests it rubs: position-based dynamics. Two, one of which rubs
+more while the other is thicker, take about a sixth of what MuJoCo takes
+(``benchmarks/rope_engines.py``). They err by a centimetre or two, and now and then about what the
+rope gets caught on, though rarely both at once; so what they say is a feature to learn from and
+no verdict.
 
-It is a row of ``loose_dim(scene)`` numbers: the nodes between the grippers from A to B, metres in
-the world frame, and then how far each of them moved in the last of the steps that every command
-is carried out in.
+They are a row of ``loose_dim(scene)`` numbers. For each rope these are the nodes between the
+grippers from A to B, metres in the world frame, and then how far each of them moved in the last
+of the steps that every command is carried out in.
 """
 
 from __future__ import annotations
@@ -17,24 +19,29 @@ from numpy.typing import NDArray
 
 from systems.loose_rope_kernels import move_loose_ropes
 from systems.obstacles import Array
-from systems.rope_scene import Scene
+from systems.rope_scene import ROPE_RADIUS, Scene
+
+# Friction and radius of each. Only nodes are kept out of obstacles, and the links between them cut
+# edges: so they are thicker than the rope. What depends on which of the two it is, is in doubt.
+KINDS = np.array([[0.35, ROPE_RADIUS + 0.002], [0.25, ROPE_RADIUS + 0.004]])
 
 
 def loose_dim(scene: Scene) -> int:
-    """Return how many numbers a loose rope in this scene takes."""
-    return 6 * (scene.n_nodes - 2)
+    """Return how many numbers the loose ropes of one state take in this scene."""
+    return len(KINDS) * 6 * (scene.n_nodes - 2)
 
 
-def loose_rope_at_rest(nodes: Array) -> Array:
-    """Describe a rope that rests with its nodes, shape (n_nodes, 3), where they are."""
+def loose_ropes_at_rest(nodes: Array) -> Array:
+    """Describe ropes that rest with their nodes, shape (n_nodes, 3), where they are."""
     inner = nodes[1:-1].ravel()
-    return np.concatenate([inner, np.zeros_like(inner)])
+    return np.tile(np.concatenate([inner, np.zeros_like(inner)]), len(KINDS))
 
 
 def loose_nodes(loose: Array, grippers: Array) -> Array:
-    """Return the nodes of one loose rope and its grippers, shape (n_nodes, 3)."""
-    first, last = grippers.reshape(2, 3)
-    return np.vstack([first, loose[: len(loose) // 2].reshape(-1, 3), last])
+    """Return the nodes of a row's ropes and its grippers, shape (n_ropes, n_nodes, 3)."""
+    inner = loose.reshape(len(KINDS), 2, -1, 3)[:, 0]
+    ends = np.broadcast_to(grippers.reshape(2, 1, 1, 3), (2, len(KINDS), 1, 3))
+    return np.concatenate([ends[0], inner, ends[1]], axis=1)
 
 
 def propagate_loose_ropes(
@@ -64,6 +71,6 @@ def propagate_loose_ropes(
     next_loose = np.empty_like(loose)
     spacing = scene.rope_length / (scene.n_nodes - 1)
     move_loose_ropes(
-        loose, grippers, command, moves, spacing, scene.packed, scene.n_nodes, next_loose
+        loose, grippers, command, moves, spacing, KINDS, scene.packed, scene.n_nodes, next_loose
     )
     return next_loose

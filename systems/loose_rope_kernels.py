@@ -8,20 +8,16 @@ import numpy as np
 from numba import njit
 
 from systems.distance_kernels import gradient, nearest_obstacle
-from systems.rope_scene import ROPE_RADIUS
 
 # Strides and steps are those of Γ. What gravity adds to a free node's displacement from step to
 # step, in metres, and the share of it that is kept, are MuJoCo's: 4 m/s² times 5 ms squared, and
-# 0.95 every other step. Friction and sweeps fit the nodes of executions in random scenes.
+# 0.95 every other step.
 LONGEST_STRIDE = 0.005
 STEPS_PER_STRIDE = 2
 RESTING_STEPS = 4
 FALL = 1e-4
 KEPT = 0.975
-FRICTION = 0.25
 SWEEPS = 2
-# Only nodes are kept out of obstacles: the links between them cut edges by a little less.
-CLEARANCE = ROPE_RADIUS + 0.002
 
 
 @njit(cache=True, nogil=True)
@@ -82,29 +78,36 @@ def shorten_link(nodes: Any, i: int, spacing: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def push_out(nodes: Any, i: int, before: Any, packed: Any) -> float:
+def push_out(nodes: Any, i: int, before: Any, friction: float, radius: float, packed: Any) -> float:
     """Move a node out of the obstacles, and let it rub there; return how far from them it is."""
     d, index = nearest_obstacle(nodes[i, 0], nodes[i, 1], nodes[i, 2], packed)
-    if d >= CLEARANCE:
+    if d >= radius:
         return d
     gx, gy, gz = gradient(nodes[i, 0], nodes[i, 1], nodes[i, 2], packed[index])
-    depth = CLEARANCE - d
+    depth = radius - d
     x = nodes[i, 0] + depth * gx - before[i, 0]
     y = nodes[i, 1] + depth * gy - before[i, 1]
     z = nodes[i, 2] + depth * gz - before[i, 2]
     away = x * gx + y * gy + z * gz
     u, v, w = x - away * gx, y - away * gy, z - away * gz
     slid = np.sqrt(u * u + v * v + w * w)
-    held = 1.0 if slid <= FRICTION * depth else FRICTION * depth / slid
+    held = 1.0 if slid <= friction * depth else friction * depth / slid
     nodes[i, 0] = before[i, 0] + x - held * u
     nodes[i, 1] = before[i, 1] + y - held * v
     nodes[i, 2] = before[i, 2] + z - held * w
-    return CLEARANCE
+    return radius
 
 
 @njit(cache=True, nogil=True)
 def step_nodes(
-    nodes: Any, moved: Any, before: Any, clear: Any, spacing: float, packed: Any
+    nodes: Any,
+    moved: Any,
+    before: Any,
+    clear: Any,
+    spacing: float,
+    friction: float,
+    radius: float,
+    packed: Any,
 ) -> None:
     """Take one step; ``clear`` holds what each node surely is away from the obstacles."""
     last = nodes.shape[0] - 1
@@ -121,15 +124,23 @@ def step_nodes(
     for i in range(1, last):
         x, y, z = nodes[i, 0] - before[i, 0], nodes[i, 1] - before[i, 1], nodes[i, 2] - before[i, 2]
         clear[i] -= np.sqrt(x * x + y * y + z * z)
-        if clear[i] < CLEARANCE:
-            clear[i] = push_out(nodes, i, before, packed)
+        if clear[i] < radius:
+            clear[i] = push_out(nodes, i, before, friction, radius, packed)
         for k in range(3):
             moved[i, k] = KEPT * (nodes[i, k] - before[i, k])
 
 
 @njit(cache=True, nogil=True)
 def move_ends(
-    nodes: Any, moved: Any, command: Any, spacing: float, packed: Any, before: Any, clear: Any
+    nodes: Any,
+    moved: Any,
+    before: Any,
+    clear: Any,
+    command: Any,
+    spacing: float,
+    friction: float,
+    radius: float,
+    packed: Any,
 ) -> None:
     """Carry out a command of the grippers in strides, then rest."""
     last, longest = nodes.shape[0] - 1, 0.0
@@ -146,24 +157,37 @@ def move_ends(
             nodes[0, k] = before[0, k] + share * command[k]
             nodes[last, k] = before[last, k] + share * command[3 + k]
         for _ in range(STEPS_PER_STRIDE):
-            step_nodes(nodes, moved, before, clear, spacing, packed)
+            step_nodes(nodes, moved, before, clear, spacing, friction, radius, packed)
     for _ in range(RESTING_STEPS):
-        step_nodes(nodes, moved, before, clear, spacing, packed)
+        step_nodes(nodes, moved, before, clear, spacing, friction, radius, packed)
 
 
 @njit(cache=True, nogil=True)
 def move_loose_ropes(
-    rows: Any, q: Any, commands: Any, valid: Any, spacing: float, packed: Any, n: int, out: Any
+    rows: Any,
+    q: Any,
+    commands: Any,
+    valid: Any,
+    spacing: float,
+    kinds: Any,
+    packed: Any,
+    n: int,
+    out: Any,
 ) -> None:
     """Write where the loose ropes of valid rows go; the others are copied.
 
-    ``q`` holds the grippers' positions before the commands, ``n`` counts nodes with both ends.
+    ``q`` holds the grippers' positions before the commands, ``kinds`` the friction and the radius
+    of each rope in a row; ``n`` counts nodes with both ends.
     """
     nodes, moved, before, clear = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
+    width = 6 * (n - 2)
     for i in range(rows.shape[0]):
-        if valid[i]:
-            read_nodes(rows[i], q[i], nodes, moved)
-            move_ends(nodes, moved, commands[i], spacing, packed, before, clear)
-            write_nodes(nodes, moved, out[i])
-        else:
+        if not valid[i]:
             out[i] = rows[i]
+            continue
+        for j in range(kinds.shape[0]):
+            rope = slice(j * width, (j + 1) * width)
+            read_nodes(rows[i, rope], q[i], nodes, moved)
+            friction, radius = kinds[j, 0], kinds[j, 1]
+            move_ends(nodes, moved, before, clear, commands[i], spacing, friction, radius, packed)
+            write_nodes(nodes, moved, out[i, rope])

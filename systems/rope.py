@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.band import WORKSPACE_SHAPE, bands_close, reduce_rope, reduced_dim
 from systems.distance import signed_distance
-from systems.loose_rope import loose_dim, loose_rope_at_rest, propagate_loose_ropes
+from systems.loose_rope import loose_dim, loose_ropes_at_rest, propagate_loose_ropes
 from systems.rope_features import FEATURES
 from systems.rope_kernels import all_finite, fill_margins, propagate_rope_rows, steer_rows
 from systems.rope_rollout import ENGINES, RopeRollout, rope_length
@@ -39,7 +39,7 @@ class Rope(System):
 
     True states are :class:`systems.rope_state.RopeState`. A reduced state is the positions of
     grippers A and B, which are its configuration, and then the points of the elastic band from A
-    to B (see :mod:`systems.band`); with ``features="curtain"`` a guess at the rope itself follows
+    to B (see :mod:`systems.band`); with ``features="curtain"`` guesses at the rope itself follow
     (see :mod:`systems.loose_rope`). Commands are displacements of A and B, together no more than
     ``step_size``. All are metres in the world frame, z up.
 
@@ -51,7 +51,7 @@ class Rope(System):
         Simulates the rope in :meth:`rollout`; started when it is first needed.
     features : {"voxels", "curtain", "vector"}, default="voxels"
         What :meth:`features` gives: bit-packed voxel grids, for the "voxnet" backend of the
-        classifier; or, for any estimator, what hangs below the band in 319 numbers, or thirteen
+        classifier; or, for any estimator, what hangs below the band in 496 numbers, or thirteen
         numbers.
 
     Raises
@@ -96,7 +96,7 @@ class Rope(System):
         self._execution = RopeRollout(scene, engine)
 
     def reduce(self, state: RopeState) -> Array:
-        """Pull the rope taut: r. A loose rope is then where the rope is, and at rest.
+        """Pull the rope taut: r. Loose ropes are then where the rope is, and at rest.
 
         Raises
         ------
@@ -107,14 +107,14 @@ class Rope(System):
         band = reduce_rope(state.nodes, state.grippers, self.scene)
         if not self._carries_loose_rope:
             return band
-        return np.concatenate([band, loose_rope_at_rest(state.nodes)])
+        return np.concatenate([band, loose_ropes_at_rest(state.nodes)])
 
     def propagate(self, reduced: Array, command: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Move the ends of bands and let the bands contract: g.
 
         A successor keeps the grippers 0.03 m away from the obstacles, the world's bounds and one
         another; grippers that are nearer may not come nearer still. And its band is not
-        overstretched; a loose rope may be. What costs least is checked first.
+        overstretched; loose ropes may be. What costs least is checked first.
         """
         rows = self._as_rows(reduced, "reduced", self.reduced_dim)
         moves = self._as_rows(command, "command", 6, len(rows))
@@ -176,7 +176,7 @@ class Rope(System):
         -------
         X : ndarray of shape (n, n_features)
             With "voxels", uint8 of 12288 features: see
-            :func:`systems.rope_voxels.voxel_features`. With "curtain", float32 of 319: see
+            :func:`systems.rope_voxels.voxel_features`. With "curtain", float32 of 496: see
             :func:`systems.rope_curtain.curtain_features`. With "vector", float64 of 13: see
             :func:`systems.rope_features.vector_features`.
         """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from systems.band import band_length, gripper_separation, reduced_dim
-from systems.loose_rope import loose_dim
+from systems.loose_rope import KINDS, loose_dim
 from systems.obstacles import Array
 from systems.rope_curtain_kernels import (
     LEAST_SPAN,
@@ -22,8 +22,9 @@ _N_CELLS = N_COLUMNS * N_ROWS
 _N_LENGTHS = 4
 _RISES = [2, 6]
 _CURTAIN = 2 * _N_LENGTHS
-_SHEET = _CURTAIN + _N_CELLS
-_OFFSETS = slice(_SHEET + _N_CELLS, _SHEET + _N_CELLS + 3 * N_COLUMNS)
+_FIRST_SHEET = _CURTAIN + _N_CELLS
+_N_OFFSETS = 3 * N_COLUMNS
+_SHEETS = tuple(_FIRST_SHEET + i * (_N_CELLS + _N_OFFSETS + 1) for i in range(len(KINDS)))
 
 
 def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array:
@@ -35,11 +36,11 @@ def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array
     rise from gripper A to B and the depth of the rope, as shares of the rope's length; then,
     after it, the signed distance to the obstacles on a grid of 16 columns along the band by 8
     rows from the band down to a little below the rope, clipped to -0.05 and 0.15 m, in units of
-    0.05 m. A rope that rests on an edge drags behind its grippers, so then come such a grid from
-    the band towards the loose rope (see :mod:`systems.loose_rope`) and a little beyond; the way
-    from band to loose rope in its 16 columns, in the same units, along the horizontal direction
-    from A to B, to the left of it, and up; the length of the loose rope as a share of the longest
-    that is allowed; and the motion of the grippers in steps of 0.025 m: along, to the left, and
+    0.05 m. A rope that rests on an edge drags behind its grippers, so then come, for each loose
+    rope (see :mod:`systems.loose_rope`), such a grid from the band towards it and a little beyond;
+    the way from band to loose rope in its 16 columns, in the same units, along the horizontal
+    direction from A to B, to the left of it, and up; and its length as a share of the longest that
+    is allowed. Last comes the motion of the grippers in steps of 0.025 m: along, to the left, and
     up. The features are the same wherever the scene is put and however it is turned about the
     vertical.
 
@@ -51,7 +52,7 @@ def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array
 
     Returns
     -------
-    X : ndarray of float32 of shape (n, 319)
+    X : ndarray of float32 of shape (n, 496)
     """
     before, _ = _checked_parts(reduced, "reduced", scene)
     after, loose = _checked_parts(next_reduced, "next_reduced", scene, len(before))
@@ -71,22 +72,29 @@ def curtain_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array
 def mirrored(features: Array) -> Array:
     """Return the features of the same transitions in a mirror that stands along the rope."""
     image = features.copy()
-    image[:, [*range(_OFFSETS.start + 1, _OFFSETS.stop, 3), -5, -2]] *= -1.0
+    for offsets in map(_offsets, _SHEETS):
+        image[:, offsets][:, 1::3] *= -1.0
+    image[:, [-5, -2]] *= -1.0
     return image
 
 
 def reversed_ends(features: Array) -> Array:
     """Return the features of the same transitions with the names of the grippers exchanged."""
     image = features.copy()
-    for first in (_CURTAIN, _SHEET):
+    for first in (_CURTAIN, *_SHEETS):
         cells = image[:, first : first + _N_CELLS].reshape(-1, N_COLUMNS, N_ROWS)
         image[:, first : first + _N_CELLS] = cells[:, ::-1].reshape(-1, _N_CELLS)
     image[:, _RISES] *= -1.0
     turned = np.array([-1.0, -1.0, 1.0], dtype=features.dtype)
-    offsets = image[:, _OFFSETS].reshape(-1, N_COLUMNS, 3)
-    image[:, _OFFSETS] = (offsets[:, ::-1] * turned).reshape(-1, 3 * N_COLUMNS)
+    for offsets in map(_offsets, _SHEETS):
+        ways = features[:, offsets].reshape(-1, N_COLUMNS, 3)
+        image[:, offsets] = (ways[:, ::-1] * turned).reshape(-1, _N_OFFSETS)
     image[:, -6:-3], image[:, -3:] = features[:, -3:] * turned, features[:, -6:-3] * turned
     return image
+
+
+def _offsets(sheet: int) -> slice:
+    return slice(sheet + _N_CELLS, sheet + _N_CELLS + _N_OFFSETS)
 
 
 def _checked_parts(
@@ -106,12 +114,14 @@ def _lengths(bands: Array, depths: Array, scene: Scene) -> Array:
 
 def _sheets(bands: Array, loose: Array, scene: Scene) -> Array:
     """Return the distances between bands and loose ropes, the ways, and the ropes' lengths."""
-    n = len(bands)
-    sheets, offsets = np.empty((n, N_COLUMNS, N_ROWS)), np.empty((n, N_COLUMNS, 3))
-    lengths = np.empty(n)
-    fill_sheets(bands, loose, scene.n_nodes, scene.packed, sheets, offsets, lengths)
-    flat = sheets.reshape(n, _N_CELLS), offsets.reshape(n, 3 * N_COLUMNS)
-    return np.hstack([*flat, lengths[:, None] / scene.max_band_length])
+    n, parts = len(bands), []
+    for ropes in np.split(loose, len(KINDS), axis=1):
+        sheets, offsets = np.empty((n, N_COLUMNS, N_ROWS)), np.empty((n, N_COLUMNS, 3))
+        lengths, ropes = np.empty(n), np.ascontiguousarray(ropes)
+        fill_sheets(bands, ropes, scene.n_nodes, scene.packed, sheets, offsets, lengths)
+        parts += [sheets.reshape(n, _N_CELLS), offsets.reshape(n, _N_OFFSETS)]
+        parts.append(lengths[:, None] / scene.max_band_length)
+    return np.hstack(parts)
 
 
 def _motion(before: Array, after: Array) -> Array:

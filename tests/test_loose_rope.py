@@ -7,14 +7,13 @@ from rope_paths import PATHS, path_commands
 from systems import Box, Rope, Scene
 from systems.band import reduced_dim
 from systems.distance import signed_distance
-from systems.loose_rope import loose_nodes, loose_rope_at_rest, propagate_loose_ropes
+from systems.loose_rope import KINDS, loose_nodes, loose_ropes_at_rest, propagate_loose_ropes
 from systems.rope_rollout import RopeRollout
 from systems.rope_scene import hanging_rope
 from systems.rope_scenes import load_scene
 
 WORLD = np.array([[-2.0] * 3, [2.0] * 3])
 ENDS = np.array([[0.0, -0.2, 0.0], [0.0, 0.2, 0.0]])
-CLEARANCE = 0.012
 
 
 def hall(*obstacles, length=0.6):
@@ -22,7 +21,8 @@ def hall(*obstacles, length=0.6):
     return Scene(obstacles, WORLD, length, away, away)
 
 
-def reference_step(nodes, moved, spacing, packed):
+def reference_step(nodes, moved, spacing, kind, packed):
+    friction, radius = kind
     before = nodes.copy()
     nodes[1:-1] += moved
     nodes[1:-1, 2] -= 1e-4
@@ -35,32 +35,32 @@ def reference_step(nodes, moved, spacing, packed):
             nodes[i] += free[0] / free.sum() * (1 - spacing / length) * way
             nodes[i + 1] -= free[1] / free.sum() * (1 - spacing / length) * way
     for i in range(1, len(nodes) - 1):
-        depth = CLEARANCE - signed_distance(nodes[i][None], packed)[0]
+        depth = radius - signed_distance(nodes[i][None], packed)[0]
         if depth > 0:
             h = 1e-7 * np.eye(3)
             sides = signed_distance(np.concatenate([nodes[i] + h, nodes[i] - h]), packed)
             normal = (sides[:3] - sides[3:]) / 2e-7
             way = nodes[i] + depth * normal - before[i]
             slid = way - (way @ normal) * normal
-            rubbed = min(1.0, 0.25 * depth / max(np.linalg.norm(slid), 1e-300))
+            rubbed = min(1.0, friction * depth / max(np.linalg.norm(slid), 1e-300))
             nodes[i] = before[i] + way - rubbed * slid
     return 0.975 * (nodes - before)[1:-1]
 
 
-def reference_move(nodes, moved, command, spacing, packed):
+def reference_move(nodes, moved, command, spacing, kind, packed):
     nodes, start = nodes.copy(), nodes[[0, -1]].copy()
     n_strides = max(1, int(np.ceil(np.linalg.norm(command.reshape(2, 3), axis=1).max() / 0.005)))
     for share in np.arange(1, n_strides + 1) / n_strides:
         nodes[[0, -1]] = start + share * command.reshape(2, 3)
         for _ in range(2):
-            moved = reference_step(nodes, moved, spacing, packed)
+            moved = reference_step(nodes, moved, spacing, kind, packed)
     for _ in range(4):
-        moved = reference_step(nodes, moved, spacing, packed)
+        moved = reference_step(nodes, moved, spacing, kind, packed)
     return nodes, moved
 
 
 def carried(scene, loose, grippers, commands):
-    """Return the nodes after each of several commands."""
+    """Return the nodes after each of several commands, shape (T, n_ropes, n_nodes, 3)."""
     row, nodes = loose[None], []
     for command in commands:
         row = propagate_loose_ropes(row, grippers[None], command[None], np.array([True]), scene)
@@ -78,39 +78,44 @@ def test_it_agrees_with_a_plain_reference():
     scene = hall(bar)
     nodes = hanging_rope(ENDS + np.array([0, 0, 0.2]), 0.6, scene.n_nodes)
     spacing, rng = 0.6 / (scene.n_nodes - 1), np.random.default_rng(0)
-    row, grippers, moved = loose_rope_at_rest(nodes)[None], nodes[[0, -1]].ravel(), 0.0
-    touched = False
+    row, grippers = loose_ropes_at_rest(nodes)[None], nodes[[0, -1]].ravel()
+    ropes = [(nodes, 0.0)] * len(KINDS)
     for _ in range(25):
         command = np.tile([0.0, 0.0, -0.01], 2) + rng.normal(scale=0.004, size=6)
         row = propagate_loose_ropes(row, grippers[None], command[None], np.array([True]), scene)
-        nodes, moved = reference_move(nodes, moved, command, spacing, scene.packed)
+        ropes = [
+            reference_move(*rope, command, spacing, kind, scene.packed)
+            for rope, kind in zip(ropes, KINDS, strict=True)
+        ]
         grippers = grippers + command
-        np.testing.assert_allclose(loose_nodes(row[0], grippers), nodes, atol=1e-6)
-        touched |= signed_distance(nodes[1:-1], scene.packed).min() < CLEARANCE + 1e-6
-    assert touched
+        expected = [nodes for nodes, _ in ropes]
+        np.testing.assert_allclose(loose_nodes(row[0], grippers), expected, atol=1e-6)
+    for (nodes, _), (_, radius) in zip(ropes, KINDS, strict=True):
+        assert signed_distance(nodes[1:-1], scene.packed).min() < radius + 1e-6, "they touch"
 
 
 def test_a_rope_in_the_air_hangs_as_a_catenary():
     scene = hall()
     laid = np.linspace(*ENDS, scene.n_nodes)
     still = np.zeros((200, 6))
-    nodes = carried(scene, loose_rope_at_rest(laid), ENDS.ravel(), still)[-1]
+    ropes = carried(scene, loose_ropes_at_rest(laid), ENDS.ravel(), still)[-1]
     expected = hanging_rope(ENDS, 0.6, scene.n_nodes)
-    np.testing.assert_allclose(nodes, expected, atol=0.01)
+    np.testing.assert_allclose(ropes, [expected] * len(KINDS), atol=0.01)
 
 
 def test_it_lies_on_a_bar_and_not_in_it():
     scene = hall(Box((0.0, 0.0, -0.1), (0.3, 0.03, 0.03), "bar"))
     laid = np.linspace(*ENDS, scene.n_nodes)
-    nodes = carried(scene, loose_rope_at_rest(laid), ENDS.ravel(), np.zeros((200, 6)))[-1]
-    middle = nodes[scene.n_nodes // 2]
-    assert -0.07 + CLEARANCE - 1e-6 < middle[2] < -0.05
-    assert signed_distance(nodes[1:-1], scene.packed).min() > CLEARANCE - 0.005
+    ropes = carried(scene, loose_ropes_at_rest(laid), ENDS.ravel(), np.zeros((200, 6)))[-1]
+    for nodes, (_, radius) in zip(ropes, KINDS, strict=True):
+        middle = nodes[scene.n_nodes // 2]
+        assert -0.07 + radius - 1e-6 < middle[2] < -0.05
+        assert signed_distance(nodes[1:-1], scene.packed).min() > radius - 0.005
 
 
 def test_ropes_whose_commands_are_not_carried_out_stay():
     scene = hall()
-    rows = np.tile(loose_rope_at_rest(hanging_rope(ENDS, 0.6, scene.n_nodes)), (2, 1))
+    rows = np.tile(loose_ropes_at_rest(hanging_rope(ENDS, 0.6, scene.n_nodes)), (2, 1))
     grippers, command = np.tile(ENDS.ravel(), (2, 1)), np.full((2, 6), 0.01)
     moved = propagate_loose_ropes(rows, grippers, command, np.array([False, True]), scene)
     np.testing.assert_array_equal(moved[0], rows[0])
@@ -124,18 +129,19 @@ def test_it_moves_like_the_rope_and_is_caught_where_the_rope_is(name, kind):
     commands, rollout = path_commands(path), RopeRollout(scene)
     start = rollout.settle(hanging_rope(path[0], scene.rope_length, scene.n_nodes))
     executed = rollout.execute(start, commands)
-    loose = loose_rope_at_rest(start.nodes)
-    nodes = carried(scene, loose, start.grippers.ravel(), commands)
+    loose = loose_ropes_at_rest(start.nodes)
+    ropes = carried(scene, loose, start.grippers.ravel(), commands)
     n = executed.n_completed
-    apart = [
-        np.linalg.norm(one - other.nodes, axis=1).mean()
-        for one, other in zip(nodes[:n], executed.states[1 : n + 1], strict=True)
-    ]
-    assert np.mean(apart) < 0.03
-    too_long = [length_of(rope) > scene.max_band_length for rope in nodes]
-    assert any(too_long) == (kind == "caught")
-    if kind == "caught":
-        assert abs(too_long.index(True) - n) <= 8
+    for nodes in ropes.swapaxes(0, 1):
+        apart = [
+            np.linalg.norm(one - other.nodes, axis=1).mean()
+            for one, other in zip(nodes[:n], executed.states[1 : n + 1], strict=True)
+        ]
+        assert np.mean(apart) < 0.03
+        too_long = [length_of(rope) > scene.max_band_length for rope in nodes]
+        assert any(too_long) == (kind == "caught")
+        if kind == "caught":
+            assert abs(too_long.index(True) - n) <= 8
 
 
 def test_a_rope_that_carries_it_plans_with_it():
@@ -149,4 +155,5 @@ def test_a_rope_that_carries_it_plans_with_it():
         reached[0, :width], Rope("simple_hook").propagate(start[None, :width], command[None])[0][0]
     )
     nodes = loose_nodes(reached[0, width:], reached[0, :6])
-    np.testing.assert_allclose(nodes[[0, -1]].ravel(), start[:6] + command, atol=1e-12)
+    ends = np.tile(start[:6] + command, (len(KINDS), 1))
+    np.testing.assert_allclose(nodes[:, [0, -1]].reshape(-1, 6), ends, atol=1e-12)
