@@ -2,7 +2,7 @@
 
 The band forgets where the slack is; a loose rope remembers. Its nodes fall, its links go slack
 but do not stretch, and where it rests it rubs: position-based dynamics. Two, one of which rubs
-more while the other is thicker, take about a sixth of what MuJoCo takes
+more while the other is thicker, take a tenth to a sixth of what MuJoCo takes
 (``benchmarks/rope_engines.py``). They err by a centimetre or two, and now and then about what the
 rope gets caught on, though rarely both at once; so what they say is a feature to learn from and
 no verdict.
