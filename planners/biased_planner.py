@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 from abc import abstractmethod
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator
+from threadpoolctl import threadpool_limits
 
 from planners.check_transition import CheckTransition
 from planners.ompl_search import Budget
@@ -120,7 +122,8 @@ class BiasedPlanner(BaseEstimator):
         # OMPL ignores a seed of zero.
         ompl_seed = 1 + int(for_ompl.generate_state(1)[0])
         budget = Budget(int(self.max_iterations), self.time_limit)
-        found = self._search(Search(start, goals, check, budget, rng, ompl_seed))
+        with _one_thread(check):
+            found = self._search(Search(start, goals, check, budget, rng, ompl_seed))
         duration = time.perf_counter() - began
         return PlanResult(
             reduced=found.reduced,
@@ -187,3 +190,8 @@ class BiasedPlanner(BaseEstimator):
         if trusted.any():
             return goals[trusted]
         return goals[[int(np.argmax(check.probability(goals, goals)))]]
+
+
+def _one_thread(check: CheckTransition) -> AbstractContextManager[Any]:
+    """Keep an estimator from sharing out its rows: of a few, threads mostly wait."""
+    return nullcontext() if check.answers_fast else threadpool_limits(1, user_api="openmp")

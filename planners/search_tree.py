@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -45,9 +47,9 @@ class SearchTree:
         new_size = self._size + len(reduced)
         if new_size > len(self._reduced):
             capacity = max(2 * len(self._reduced), new_size, 256)
-            self._reduced = np.resize(self._reduced, (capacity, self._reduced.shape[1]))
-            self._configurations = np.resize(self._configurations, (capacity, self._dim))
-            self._parents = np.resize(self._parents, capacity)
+            self._reduced = _with_room(self._reduced, capacity)
+            self._configurations = _with_room(self._configurations, capacity)
+            self._parents = _with_room(self._parents, capacity)
         added = np.arange(self._size, new_size)
         self._reduced[added] = reduced
         self._configurations[added] = reduced[:, : self._dim]
@@ -76,6 +78,12 @@ class SearchTree:
         children = np.flatnonzero(self.parents >= 0)
         configurations = self._configurations[: self._size]
         return np.stack([configurations[self.parents[children]], configurations[children]], axis=1)
+
+
+def _with_room(rows: NDArray[Any], capacity: int) -> NDArray[Any]:
+    roomy = np.empty((capacity, *rows.shape[1:]), rows.dtype)
+    roomy[: len(rows)] = rows
+    return roomy
 
 
 @njit(cache=True, nogil=True)

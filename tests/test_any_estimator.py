@@ -11,6 +11,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.tree import DecisionTreeClassifier
 from test_planners import assert_same_plan, assert_sound
+from threadpoolctl import threadpool_info, threadpool_limits
 from toy_systems import Disc
 
 from planners import BiasedRRT, BiasedRRTConnect
@@ -49,6 +50,33 @@ def test_plans_use_what_the_estimator_trusts(planner, estimator):
             np.testing.assert_allclose(result.reliability, expected)
         assert result.n_accepted_unreliable == 0
         assert result.n_checked >= len(result.commands)
+
+
+class Onlooker(DummyClassifier):
+    """Notes how many threads OpenMP may use whenever it is asked."""
+
+    seen = ()
+
+    def predict(self, X):
+        threads = [pool["num_threads"] for pool in openmp_pools()]
+        self.seen = (*self.seen, *threads)
+        return super().predict(X)
+
+
+def openmp_pools():
+    return [pool for pool in threadpool_info() if pool["user_api"] == "openmp"]
+
+
+@pytest.mark.parametrize("planner", [BiasedRRTConnect, BiasedRRT])
+def test_few_rows_are_not_shared_out_among_threads(planner, disc_data):
+    X, y, _ = disc_data
+    onlooker = Onlooker(strategy="constant", constant=1).fit(X, y)
+    with threadpool_limits(2, user_api="openmp"):
+        before = openmp_pools()
+        planner(Disc(), onlooker, accuracy=0.9, random_state=0).plan(START, GOAL)
+        assert openmp_pools() == before
+    assert before
+    assert set(onlooker.seen) == {1}
 
 
 @pytest.mark.parametrize("planner", [BiasedRRTConnect, BiasedRRT])
