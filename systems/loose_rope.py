@@ -2,10 +2,10 @@
 
 The band forgets where the slack is; a loose rope remembers. Its nodes fall, its links go slack
 but do not stretch, and where it rests it rubs: position-based dynamics. Two, one of which rubs
-more while the other is thicker, take a tenth to a sixth of what MuJoCo takes
+more while the other is thicker, take a tenth to a seventh of what MuJoCo takes
 (``benchmarks/rope_engines.py``). They err by a centimetre or two, and now and then about what the
-rope gets caught on, though rarely both at once; so what they say is a feature to learn from and
-no verdict.
+rope gets caught on, though rarely both at once. A plan may overstretch neither, as it may not
+overstretch the band; all else that they say is a feature to learn from.
 
 They are a row of ``loose_dim(scene)`` numbers. For each rope these are the nodes between the
 grippers from A to B, metres in the world frame, and then how far each of them moved in the last
@@ -45,8 +45,13 @@ def loose_nodes(loose: Array, grippers: Array) -> Array:
 
 
 def propagate_loose_ropes(
-    loose: Array, grippers: Array, command: Array, moves: NDArray[np.bool_], scene: Scene
-) -> Array:
+    loose: Array,
+    grippers: Array,
+    command: Array,
+    moves: NDArray[np.bool_],
+    scene: Scene,
+    longest: float,
+) -> tuple[Array, NDArray[np.bool_]]:
     """Let loose ropes follow their grippers.
 
     Parameters
@@ -59,18 +64,22 @@ def propagate_loose_ropes(
     moves : ndarray of bool of shape (n,)
         Which of them are carried out; the other ropes stay as they are.
     scene : Scene
+    longest : float
+        Longest that a rope may become, metres.
 
     Returns
     -------
     next_loose : ndarray of shape (n, loose_dim)
+    valid : ndarray of bool of shape (n,)
+        Those of ``moves`` after which no rope is longer; ropes that would be stay as they are.
 
     References
     ----------
     Mueller et al. 2007, "Position Based Dynamics".
     """
-    next_loose = np.empty_like(loose)
-    spacing = scene.rope_length / (scene.n_nodes - 1)
+    next_loose, valid = np.empty_like(loose), moves.copy()
+    spacing, n_nodes = scene.rope_length / (scene.n_nodes - 1), scene.n_nodes
     move_loose_ropes(
-        loose, grippers, command, moves, spacing, KINDS, scene.packed, scene.n_nodes, next_loose
+        loose, grippers, command, valid, spacing, longest, KINDS, scene.packed, n_nodes, next_loose
     )
-    return next_loose
+    return next_loose, valid

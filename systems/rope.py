@@ -52,7 +52,14 @@ class Rope(System):
     features : {"voxels", "curtain", "vector"}, default="voxels"
         What :meth:`features` gives: bit-packed voxel grids, for the "voxnet" backend of the
         classifier; or, for any estimator, what hangs below the band in 496 numbers, or thirteen
-        numbers.
+        numbers. With "curtain" reduced states carry loose ropes, which :meth:`propagate` moves
+        and does not allow to be overstretched.
+
+    Attributes
+    ----------
+    max_loose_rope_length : float
+        Longest that a loose rope may become in a successor, metres: as long as the band may. Only
+        with ``features="curtain"``.
 
     Raises
     ------
@@ -91,6 +98,7 @@ class Rope(System):
         self._band_dim = self.reduced_dim = reduced_dim(scene)
         if features == "curtain":
             self.reduced_dim += loose_dim(scene)
+            self.max_loose_rope_length = scene.max_band_length
         self.bounds = np.tile(scene.bounds, 2)
         self._packed = scene.packed
         self._execution = RopeRollout(scene, engine)
@@ -110,15 +118,15 @@ class Rope(System):
         return np.concatenate([band, loose_ropes_at_rest(state.nodes)])
 
     def propagate(self, reduced: Array, command: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Move the ends of bands and let the bands contract: g.
+        """Move the ends of bands and of loose ropes, and let the bands contract: g.
 
         A successor keeps the grippers 0.03 m away from the obstacles, the world's bounds and one
-        another; grippers that are nearer may not come nearer still. And its band is not
-        overstretched; loose ropes may be. What costs least is checked first.
+        another; grippers that are nearer may not come nearer still. Neither its band nor one of
+        its loose ropes is overstretched. What costs least is checked first.
         """
         rows = self._as_rows(reduced, "reduced", self.reduced_dim)
         moves = self._as_rows(command, "command", 6, len(rows))
-        bands = self.bands(rows)
+        bands = self._bands(rows)
         next_bands, valid = np.empty_like(bands), np.empty(len(rows), dtype=np.bool_)
         propagate_rope_rows(
             bands,
@@ -134,12 +142,14 @@ class Rope(System):
         if not self._carries_loose_rope:
             return next_bands, valid
         loose = np.ascontiguousarray(rows[:, self._band_dim :])
-        next_loose = propagate_loose_ropes(loose, bands[:, :6], moves, valid, self.scene)
-        return np.hstack([next_bands, next_loose]), valid
+        next_loose, valid = propagate_loose_ropes(
+            loose, bands[:, :6], moves, valid, self.scene, self.max_loose_rope_length
+        )
+        return np.where(valid[:, None], np.hstack([next_bands, next_loose]), rows), valid
 
     def bands(self, reduced: Array) -> Array:
         """Return reduced states without the loose ropes, for :mod:`systems.band`."""
-        return np.ascontiguousarray(reduced[:, : self._band_dim])
+        return self._bands(self._as_rows(reduced, "reduced", self.reduced_dim))
 
     def steer(self, reduced: Array, configuration: Array) -> Array:
         """Return the displacement of at most one step, in R^6, towards gripper positions."""
@@ -167,7 +177,9 @@ class Rope(System):
 
     def close(self, predicted: Array, executed: Array) -> NDArray[np.bool_]:
         """Say whether bands are near one another and of one homotopy class: Close."""
-        return bands_close(self.bands(predicted), self.bands(executed), self.scene)
+        predicted = self._as_rows(predicted, "predicted", self.reduced_dim)
+        executed = self._as_rows(executed, "executed", self.reduced_dim, len(predicted))
+        return bands_close(self._bands(predicted), self._bands(executed), self.scene)
 
     def features(self, reduced: Array, next_reduced: Array) -> NDArray[Any]:
         """Describe transitions to an estimator.
@@ -225,6 +237,9 @@ class Rope(System):
     @property
     def _carries_loose_rope(self) -> bool:
         return self.reduced_dim > self._band_dim
+
+    def _bands(self, rows: Array) -> Array:
+        return np.ascontiguousarray(rows[:, : self._band_dim])
 
     def _goal(self) -> Array:
         return self.scene.goal.reshape(1, 6).copy()

@@ -114,14 +114,13 @@ def _lengths(bands: Array, depths: Array, scene: Scene) -> Array:
 
 def _sheets(bands: Array, loose: Array, scene: Scene) -> Array:
     """Return the distances between bands and loose ropes, the ways, and the ropes' lengths."""
-    n, parts = len(bands), []
-    for ropes in np.split(loose, len(KINDS), axis=1):
-        sheets, offsets = np.empty((n, N_COLUMNS, N_ROWS)), np.empty((n, N_COLUMNS, 3))
-        lengths, ropes = np.empty(n), np.ascontiguousarray(ropes)
-        fill_sheets(bands, ropes, scene.n_nodes, scene.packed, sheets, offsets, lengths)
-        parts += [sheets.reshape(n, _N_CELLS), offsets.reshape(n, _N_OFFSETS)]
-        parts.append(lengths[:, None] / scene.max_band_length)
-    return np.hstack(parts)
+    shape = (len(bands), len(KINDS))
+    sheets, offsets = np.empty((*shape, N_COLUMNS, N_ROWS)), np.empty((*shape, N_COLUMNS, 3))
+    lengths, ropes = np.empty(shape), loose.reshape(*shape, loose.shape[1] // len(KINDS))
+    fill_sheets(bands, ropes, scene.n_nodes, scene.packed, sheets, offsets, lengths)
+    flat = sheets.reshape(*shape, _N_CELLS), offsets.reshape(*shape, _N_OFFSETS)
+    parts = np.concatenate([*flat, lengths[..., None] / scene.max_band_length], axis=2)
+    return parts.reshape(len(bands), len(KINDS) * (_N_CELLS + _N_OFFSETS + 1))
 
 
 def _motion(before: Array, after: Array) -> Array:

@@ -9,8 +9,8 @@ from numba import njit
 
 from systems.band_kernels import n_points
 from systems.distance_kernels import distance
-from systems.loose_rope_kernels import nodes_length, read_nodes
 from systems.rope_feature_kernels import LEAST_WIDTH, parabola_bend
+from systems.rope_kernels import length_between
 
 N_COLUMNS = 16
 N_ROWS = 8
@@ -23,19 +23,41 @@ LEAST_SPAN = 1e-6
 
 
 @njit(cache=True, nogil=True)
-def shadow_length(row: Any, i: int) -> float:
-    """Length of the shadow that a band's segment from point ``i`` casts on the floor."""
-    x, y = row[9 + 3 * i] - row[6 + 3 * i], row[10 + 3 * i] - row[7 + 3 * i]
-    return np.sqrt(x * x + y * y)
+def segment_length(row: Any, i: int, flat: bool) -> float:
+    """Length of a band's segment from point ``i``, or of its shadow on a flat floor."""
+    first = 6 + 3 * i
+    x, y = row[first + 3] - row[first], row[first + 4] - row[first + 1]
+    shadow = np.sqrt(x * x + y * y)
+    if flat:
+        return shadow
+    rise = row[first + 5] - row[first + 2]
+    return np.sqrt(shadow**2 + rise * rise)
 
 
 @njit(cache=True, nogil=True)
-def horizontal_length(row: Any, n: int) -> float:
-    """Length of the shadow that a band casts on the floor."""
+def length_of(row: Any, flat: bool) -> float:
+    """Length of a band, or of its shadow."""
     total = 0.0
-    for i in range(n - 1):
-        total += shadow_length(row, i)
+    for i in range(n_points(row) - 1):
+        total += segment_length(row, i, flat)
     return total
+
+
+@njit(cache=True, nogil=True)
+def fill_tops(row: Any, length: float, flat: bool, tops: Any) -> None:
+    """Write the points of a band that columns hang from: evenly along it, or along its shadow."""
+    n = n_points(row)
+    i, travelled, segment = 0, 0.0, segment_length(row, 0, flat)
+    for column in range(N_COLUMNS):
+        at = (column + 0.5) / N_COLUMNS
+        while i < n - 2 and travelled + segment < at * length:
+            travelled += segment
+            i += 1
+            segment = segment_length(row, i, flat)
+        ratio = (at * length - travelled) / segment if segment > 1e-12 else at
+        ratio, first = min(1.0, max(0.0, ratio)), 6 + 3 * i
+        for k in range(3):
+            tops[column, k] = row[first + k] + ratio * (row[first + 3 + k] - row[first + k])
 
 
 @njit(cache=True, nogil=True)
@@ -57,46 +79,29 @@ def hanging(row: Any, shadow: float, rope_length: float) -> tuple[float, float]:
 def fill_depths(rows: Any, rope_length: float, depths: Any) -> None:
     """Write how deep the rope of each row hangs."""
     for i in range(rows.shape[0]):
-        shadow = horizontal_length(rows[i], n_points(rows[i]))
+        shadow = length_of(rows[i], True)
         width, bend = hanging(rows[i], shadow, rope_length)
         depths[i] = 0.25 * bend * width * width
 
 
 @njit(cache=True, nogil=True)
-def fill_curtain(row: Any, packed: Any, rope_length: float, out: Any) -> float:
+def fill_curtain(row: Any, packed: Any, rope_length: float, tops: Any, out: Any) -> float:
     """Write distances on a grid that hangs from a band; return how deep the rope hangs.
 
     Columns are evenly spaced along the band's shadow. The rope hangs by the parabola that it
     would hang in if the band were straightened in a vertical plane.
     """
-    n = n_points(row)
-    shadow = horizontal_length(row, n)
+    shadow = length_of(row, True)
     width, bend = hanging(row, shadow, rope_length)
-    i, travelled, segment = 0, 0.0, shadow_length(row, 0)
+    fill_tops(row, shadow, True, tops)
     for column in range(N_COLUMNS):
         at = (column + 0.5) / N_COLUMNS
-        while i < n - 2 and travelled + segment < at * shadow:
-            travelled += segment
-            i += 1
-            segment = shadow_length(row, i)
-        ratio = (at * shadow - travelled) / segment if segment > 1e-12 else at
-        px, py, pz = on_segment(row, i, ratio)
+        px, py, pz = tops[column, 0], tops[column, 1], tops[column, 2]
         sag = bend * width * width * at * (1.0 - at)
         for j in range(N_ROWS):
             down = DEPTH * sag * (j + 1) / N_ROWS
             out[column, j] = clipped_distance(px, py, pz - down, packed)
     return 0.25 * bend * width * width
-
-
-@njit(cache=True, nogil=True)
-def on_segment(row: Any, i: int, ratio: float) -> tuple[float, float, float]:
-    """Return a point of a band, on the segment from its point ``i``."""
-    ratio, first = min(1.0, max(0.0, ratio)), 6 + 3 * i
-    return (
-        row[first] + ratio * (row[first + 3] - row[first]),
-        row[first + 1] + ratio * (row[first + 4] - row[first + 1]),
-        row[first + 2] + ratio * (row[first + 5] - row[first + 2]),
-    )
 
 
 @njit(cache=True, nogil=True)
@@ -110,32 +115,17 @@ def direction(row: Any) -> tuple[float, float]:
 
 
 @njit(cache=True, nogil=True)
-def segment_length(row: Any, i: int) -> float:
-    """Length of a band's segment from point ``i``."""
-    rise = row[11 + 3 * i] - row[8 + 3 * i]
-    return np.sqrt(shadow_length(row, i) ** 2 + rise * rise)
-
-
-@njit(cache=True, nogil=True)
-def fill_sheet(row: Any, nodes: Any, packed: Any, sheet: Any, offsets: Any) -> None:
+def fill_sheet(row: Any, nodes: Any, packed: Any, tops: Any, sheet: Any, offsets: Any) -> None:
     """Write distances on a grid from a band to a loose rope, and the way from one to the other.
 
-    Columns match points at the same shares of the lengths. Offsets are along the way from A to
-    B, to the left of it, and up.
+    Columns match points at the same shares of the lengths; ``tops`` are the band's. Offsets are
+    along the way from A to B, to the left of it, and up.
     """
-    n, last, length = n_points(row), nodes.shape[0] - 1, 0.0
-    for i in range(n - 1):
-        length += segment_length(row, i)
+    last = nodes.shape[0] - 1
     along_x, along_y = direction(row)
-    i, travelled, segment = 0, 0.0, segment_length(row, 0)
     for column in range(N_COLUMNS):
         at = (column + 0.5) / N_COLUMNS
-        while i < n - 2 and travelled + segment < at * length:
-            travelled += segment
-            i += 1
-            segment = segment_length(row, i)
-        ratio = (at * length - travelled) / segment if segment > 1e-12 else at
-        px, py, pz = on_segment(row, i, ratio)
+        px, py, pz = tops[column, 0], tops[column, 1], tops[column, 2]
         node = min(last - 1, int(at * last))
         share = at * last - node
         x = nodes[node, 0] + share * (nodes[node + 1, 0] - nodes[node, 0]) - px
@@ -152,17 +142,21 @@ def fill_sheet(row: Any, nodes: Any, packed: Any, sheet: Any, offsets: Any) -> N
 @njit(cache=True, nogil=True)
 def fill_curtains(rows: Any, packed: Any, rope_length: float, out: Any, depths: Any) -> None:
     """Write the curtain of each row, and how deep its rope hangs."""
+    tops = np.empty((N_COLUMNS, 3))
     for i in range(rows.shape[0]):
-        depths[i] = fill_curtain(rows[i], packed, rope_length, out[i])
+        depths[i] = fill_curtain(rows[i], packed, rope_length, tops, out[i])
 
 
 @njit(cache=True, nogil=True)
 def fill_sheets(
     bands: Any, ropes: Any, n_nodes: int, packed: Any, sheets: Any, offsets: Any, lengths: Any
 ) -> None:
-    """Write what :func:`fill_sheet` does of each row, and the lengths of the loose ropes."""
-    nodes, moved = np.empty((n_nodes, 3)), np.empty((n_nodes, 3))
+    """Write what :func:`fill_sheet` does of each row's ropes, and the lengths of the ropes."""
+    nodes, tops = np.empty((n_nodes, 3)), np.empty((N_COLUMNS, 3))
     for i in range(bands.shape[0]):
-        read_nodes(ropes[i], bands[i], nodes, moved)
-        fill_sheet(bands[i], nodes, packed, sheets[i], offsets[i])
-        lengths[i] = nodes_length(nodes)
+        nodes[0], nodes[-1] = bands[i, :3], bands[i, 3:6]
+        fill_tops(bands[i], length_of(bands[i], False), False, tops)
+        for r in range(ropes.shape[1]):
+            nodes[1:-1] = ropes[i, r, : 3 * (n_nodes - 2)].reshape(-1, 3)
+            fill_sheet(bands[i], nodes, packed, tops, sheets[i, r], offsets[i, r])
+            lengths[i, r] = length_between(nodes[:: n_nodes - 1], nodes[1:-1])

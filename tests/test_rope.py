@@ -184,6 +184,18 @@ def test_collected_data_are_compact_and_resume(rope, tmp_path):
     assert data.features(Rope(features="vector")).shape == (len(data), 13)
 
 
+@pytest.mark.parametrize(("features", "width"), [("voxels", 12288), ("curtain", 496), ("vector", 13)])
+def test_no_rows_give_no_rows(features, width):
+    rope = Rope(features=features)
+    none = np.empty((0, rope.reduced_dim))
+    following, valid = rope.propagate(none, np.empty((0, 6)))
+    assert (following.shape, valid.shape) == (none.shape, (0,))
+    assert rope.features(none, none).shape == (0, width)
+    assert rope.close(none, none).shape == (0,)
+    assert rope.steer(none, np.empty((0, 6))).shape == (0, 6)
+    assert rope.goal_reached(none, np.zeros((1, 6))).shape == (0,)
+
+
 def test_ropes_pickle_and_hash_alike_before_and_after_use(rope):
     fresh = Rope("simple_hook")
     before = joblib.hash(fresh)
@@ -219,6 +231,11 @@ def test_bad_rows_states_and_goals_are_refused(rope, start):
         (lambda: rope.steer(rows, moves[:, :3]), "configuration must have the shape"),
         (lambda: rope.steer(rows, np.zeros((2, 6))), "configuration must have the shape"),
         (lambda: rope.features(broken, rows), "reduced must be finite"),
+        (lambda: rope.close(rows, np.hstack([rows, rows])), "executed must have the shape"),
+        (lambda: rope.close(rows, np.vstack([rows, rows])), "executed must have the shape"),
+        (lambda: rope.close(rows[0], rows), "predicted must have the shape"),
+        (lambda: rope.close(rows, broken), "executed must be finite"),
+        (lambda: rope.bands(broken), "reduced must be finite"),
         (lambda: rope.reduce(start), "state must be a RopeState"),
         (lambda: rope.rollout(start, moves), "state must be a RopeState"),
         (lambda: rope.succeeded(None, moves, 1.0), "state must be a RopeState"),
