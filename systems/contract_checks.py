@@ -286,6 +286,14 @@ def _check_features(system: System, reduced: Array, next_reduced: Array) -> None
     if rows.dtype.kind not in "fiub" or not np.isfinite(rows).all():
         _fail(system, "features", f"must return finite numbers, got {rows.dtype}: {rows[0]}.")
     _check_rowwise(system, "features", reduced, next_reduced)
+    none = _call(system, "features", reduced[:0], next_reduced[:0])
+    if np.shape(none) != (0, rows.shape[1]):
+        _fail(
+            system,
+            "features",
+            f"of no transitions must return an array of shape (0, {rows.shape[1]}), got "
+            f"{np.shape(none)}.",
+        )
 
 
 def _draw(system: System, rng: np.random.Generator, n: int) -> Array:

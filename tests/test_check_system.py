@@ -114,6 +114,10 @@ def changed(**attributes):
         (changed(propagate=lambda s, b, u: b + u), r"must return \(next_reduced, valid\)"),
         (changed(features=lambda s, b, c: b[0]), "features must return a row per transition"),
         (changed(features=lambda s, b, c: b * np.inf), "features must return finite numbers"),
+        (
+            changed(features=lambda s, b, c: np.array([row for row in b])),
+            r"features of no transitions must return an array of shape \(0, 2\), got \(0,\)",
+        ),
         (changed(goal_reached=lambda s, b, g: 0), "goal_reached must return one bool per row"),
         (changed(succeeded=lambda s, x, g, t: False), "succeeded says False at an infinite"),
         (changed(succeeded=lambda s, x, g, t: None), "succeeded must return a bool, got None"),
