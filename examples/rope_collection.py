@@ -13,6 +13,7 @@ import numpy as np
 from planners import BiasedRRT
 from reliability import RELIABLE, Transitions, collect_transitions
 from systems import Problem, Rope, Scene, random_rope_scene
+from systems.rope_scenes import load_scene
 from systems.validation import RandomState
 
 PAPER_SEED = 2020
@@ -36,7 +37,7 @@ class SceneData:
 
 def collect_simple_hook(folder: Path, n_plans: int, n_jobs: int) -> SceneData:
     """Collect as the paper does: one scene, many starts, no classifier."""
-    rope = Rope("simple_hook", features="curtain")
+    rope = RopeThatGoesOn(load_scene("simple_hook"))
     transitions = collect_transitions(
         rope,
         BiasedRRT(rope, max_iterations=PAPER_ITERATIONS),
@@ -49,7 +50,15 @@ def collect_simple_hook(folder: Path, n_plans: int, n_jobs: int) -> SceneData:
     return SceneData(rope.scene, transitions)
 
 
-class RopeFromItsStart(Rope):
+class RopeThatGoesOn(Rope):
+    """A rope whose plans go on where a loose rope is overstretched: mistakes make good data."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene, features="curtain")
+        self.max_loose_rope_length = np.inf
+
+
+class RopeFromItsStart(RopeThatGoesOn):
     """A rope whose problems are all the scene's own, as those that a plan is wanted for are."""
 
     def sample_problem(self, random_state: RandomState = None) -> Problem:
@@ -103,7 +112,7 @@ def _is_slotted(scene: Scene) -> bool:
 
 
 def _collect_scene(folder: Path, i: int, plan: Round, estimator: Any) -> SceneData | None:
-    rope = RopeFromItsStart(random_scene(i), features="curtain")
+    rope = RopeFromItsStart(random_scene(i))
     file, empty = folder / f"scene-{i:05d}.npz", folder / f"scene-{i:05d}.empty"
     if empty.exists() or (plan.slotted and not _is_slotted(rope.scene)):
         return None
@@ -131,6 +140,17 @@ def _plans_from_start(
         return None
 
 
+def as_far_as_allowed(part: SceneData) -> SceneData:
+    """Leave out what each plan did from where g allows it only to ropes that go on."""
+    rope, transitions = Rope(part.scene, features="curtain"), part.transitions
+    kept = [np.arange(0)]
+    for plan in np.unique(transitions.plan):
+        rows = np.flatnonzero(transitions.plan == plan)
+        _, valid = rope.propagate(transitions[rows].reduced, transitions.command[rows])
+        kept.append(rows if valid.all() else rows[: np.argmin(valid)])
+    return SceneData(part.scene, transitions[np.concatenate(kept)])
+
+
 def described(parts: Sequence[SceneData], kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the features, labels and plans of all parts; plan ids differ between scenes."""
     rows, labels, plans, first = [], [], [], 0
@@ -139,7 +159,7 @@ def described(parts: Sequence[SceneData], kind: str) -> tuple[np.ndarray, np.nda
         rows.append(transitions.features(Rope(part.scene, features=kind)))
         labels.append(part.transitions.y)
         plans.append(part.transitions.plan + first)
-        first = int(plans[-1].max()) + 1
+        first = int(plans[-1].max(initial=first - 1)) + 1
     return np.concatenate(rows), np.concatenate(labels), np.concatenate(plans)
 
 

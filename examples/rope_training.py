@@ -16,6 +16,7 @@ from rope_collection import (
     RANDOM_SCENE_SEED,
     Round,
     SceneData,
+    as_far_as_allowed,
     collect_random_scenes,
     collect_simple_hook,
     described,
@@ -121,17 +122,18 @@ def train_vector(simple_hook: SceneData) -> Any:
 
 def train_ours(simple_hook: SceneData, folder: Path, n_jobs: int) -> Any:
     """Train gradient boosting on curtains, round by round, and hold out whole plans and scenes."""
-    parts, classifier = [up_to_last_mistake(simple_hook)], None
+    parts, classifier = [worth_learning(simple_hook)], None
     for i, plan in enumerate(ROUNDS):
         found = collect_random_scenes(folder / f"random{i}", plan, classifier, n_jobs)
-        parts += map(up_to_last_mistake, found)
+        parts += map(worth_learning, found)
         classifier = fit_curtains(parts)
     return classifier
 
 
-def up_to_last_mistake(part: SceneData) -> SceneData:
-    """Leave out what plans did long after the rope was caught for good."""
-    return SceneData(part.scene, part.transitions.up_to_last_mistake(N_AFTER))
+def worth_learning(part: SceneData) -> SceneData:
+    """Leave out what g does not allow, and what plans did long after they went wrong for good."""
+    transitions = as_far_as_allowed(part).transitions
+    return SceneData(part.scene, transitions.up_to_last_mistake(N_AFTER))
 
 
 def fit_curtains(parts: Sequence[SceneData]) -> Any:
