@@ -1,4 +1,4 @@
-"""Transitions per second of the rope's two engines and of g with a loose rope, one at a time.
+"""Transitions per second of the rope's two engines and of g with two loose ropes, one at a time.
 
 Run as ``python benchmarks/rope_engines.py``; it takes about half a minute on one core. Each
 rope executes the same path beside its hook, three times. For Γ, the engine's own share of the
@@ -67,7 +67,7 @@ def measure(scene_name: str, engine: str) -> tuple[float, float]:
 
 
 def measure_loose(scene_name: str) -> float:
-    """Return how many transitions per second g makes with a band and a loose rope."""
+    """Return how many transitions per second g makes with a band and two loose ropes."""
     rope = Rope(scene_name, features="curtain")
     start = rope.reduce(rope.scene_problem().start)[None]
     commands = beside_the_hook(rope.scene.start, rope.scene.rope_length)[:, None]

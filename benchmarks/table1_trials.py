@@ -32,14 +32,22 @@ def _model(path: Path | None) -> Any:
 
 
 def run_trial(
-    name: str, seed: int, model: Path | None, options: argparse.Namespace, folder: Path
+    name: str,
+    seed: int,
+    model: Path | None,
+    features: str,
+    options: argparse.Namespace,
+    folder: Path,
 ) -> dict[str, Any]:
-    """Plan and execute once, or read what an earlier run found."""
+    """Plan and execute once, or read what an earlier run found.
+
+    The rope has ``features``, unless the model says that it was trained on others.
+    """
     file = folder / name / f"seed-{seed:03d}.json"
     if file.exists():
         return dict(json.loads(file.read_text()))
     estimator = _model(model)
-    features = getattr(estimator, "provenance_", {}).get("features", options.features)
+    features = getattr(estimator, "provenance_", {}).get("features", features)
     rope, problem, start = _scene(name, options.engine, features)
     planner = BiasedRRT(
         rope,

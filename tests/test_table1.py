@@ -30,6 +30,16 @@ def test_processes_find_what_one_finds(tmp_path, capsys):
     assert found[0] == found[1]
 
 
+def test_loose_ropes_without_a_classifier_are_a_column_of_their_own(tmp_path, capsys):
+    options = ["--scenes", "engine_assembly", "--seeds", "1", "--out", str(tmp_path)]
+    table1.main([*options, "--columns", "none", "loose"])
+    rows = [line.split(" | ")[1:3] for line in capsys.readouterr().out.splitlines()[2:4]]
+    assert [name for name, _ in rows] == ["none", "loose"]
+    (none,), (loose,) = (tmp_path.glob(f"{name}-*/*/seed-000.json") for name in ("none", "loose"))
+    found = [json.loads(file.read_text()) for file in (none, loose)]
+    assert found[0]["n_nodes"] != found[1]["n_nodes"], "what is carried decides what is valid"
+
+
 def test_trials_resume_and_any_estimator_fits(tmp_path, capsys):
     options = ["--scenes", "engine_assembly", "--seeds", "2", "--out", str(tmp_path)]
     table1.main(options)
