@@ -115,7 +115,7 @@ def changed(**attributes):
         (changed(features=lambda s, b, c: b[0]), "features must return a row per transition"),
         (changed(features=lambda s, b, c: b * np.inf), "features must return finite numbers"),
         (
-            changed(features=lambda s, b, c: np.array([row for row in b])),
+            changed(features=lambda s, b, c: np.array(list(b))),
             r"features of no transitions must return an array of shape \(0, 2\), got \(0,\)",
         ),
         (changed(goal_reached=lambda s, b, g: 0), "goal_reached must return one bool per row"),

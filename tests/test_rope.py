@@ -184,9 +184,12 @@ def test_collected_data_are_compact_and_resume(rope, tmp_path):
     assert data.features(Rope(features="vector")).shape == (len(data), 13)
 
 
-@pytest.mark.parametrize(("features", "width"), [("voxels", 12288), ("curtain", 496), ("vector", 13)])
-def test_no_rows_give_no_rows(features, width):
-    rope = Rope(features=features)
+WIDTHS = {"voxels": 12288, "curtain": 496, "vector": 13}
+
+
+@pytest.mark.parametrize("features", WIDTHS)
+def test_no_rows_give_no_rows(features):
+    rope, width = Rope(features=features), WIDTHS[features]
     none = np.empty((0, rope.reduced_dim))
     following, valid = rope.propagate(none, np.empty((0, 6)))
     assert (following.shape, valid.shape) == (none.shape, (0,))
