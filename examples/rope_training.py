@@ -24,7 +24,11 @@ from rope_collection import (
 from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.model_selection import GroupShuffleSplit, ShuffleSplit
 
-from reliability import TransitionReliabilityClassifier, __version__
+from reliability import (
+    FastHistGradientBoostingClassifier,
+    TransitionReliabilityClassifier,
+    __version__,
+)
 from systems.rope_curtain import mirrored, reversed_ends
 
 TRAINING_SEED = 0
@@ -42,7 +46,7 @@ ROUNDS = (
 )
 # Transitions of a plan that ours learns from after the rope was caught for good: about 0.4 m.
 N_AFTER = 15
-# Each call of a tree costs as much as a few rows: a few large trees plan faster than many.
+# A few large trees: chosen when each call of a tree cost as much as a few rows.
 N_TREES = 40
 PACKAGES = ("numpy", "scikit-learn", "skorch", "torch", "mujoco")
 
@@ -151,7 +155,7 @@ def fit_curtains(parts: Sequence[SceneData]) -> Any:
     _turn_into_images(X, np.random.default_rng(TRAINING_SEED))
 
     def fitted(rows: np.ndarray) -> Any:
-        boosting = HistGradientBoostingClassifier(
+        boosting = FastHistGradientBoostingClassifier(
             max_iter=N_TREES,
             learning_rate=0.2,
             max_leaf_nodes=63,

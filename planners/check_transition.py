@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 from sklearn.utils.validation import check_is_fitted
 
 from reliability.labels import RELIABLE, UNRELIABLE
@@ -132,7 +133,7 @@ class CheckTransition:
             return np.zeros(len(rows))
         if self._fast is not None:
             logits = self._fast(rows).astype(np.float64)
-            return np.exp(-np.logaddexp(0, -logits if self._reliable_column == 1 else logits))
+            return expit(logits if self._reliable_column == 1 else -logits)
         if not hasattr(self._estimator, "predict_proba"):
             return self._predict(rows).astype(np.float64)
         columns = np.asarray(self._estimator.predict_proba(rows), dtype=np.float64)

@@ -9,6 +9,7 @@ from reliability.labels import RELIABLE, UNRELIABLE, label_transitions
 from reliability.transitions import Transitions
 
 if TYPE_CHECKING:
+    from reliability.boosting import FastHistGradientBoostingClassifier
     from reliability.classifier import TransitionReliabilityClassifier
     from reliability.collect import collect_transitions
     from reliability.persistence import ModelFileError, load_estimator
@@ -19,6 +20,7 @@ __version__ = "0.1.0"
 __all__ = [
     "RELIABLE",
     "UNRELIABLE",
+    "FastHistGradientBoostingClassifier",
     "ModelFileError",
     "Summary",
     "TransitionReliabilityClassifier",
@@ -29,6 +31,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "FastHistGradientBoostingClassifier": "reliability.boosting",
     "TransitionReliabilityClassifier": "reliability.classifier",
     "collect_transitions": "reliability.collect",
     "ModelFileError": "reliability.persistence",
