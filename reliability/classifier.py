@@ -90,7 +90,8 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         "voxnet" sees cubes of so many cells a side as one: the mean of the first channel, which
         is the surroundings, and the maximum of the others. 2 makes it ten times as fast.
     mixed_precision : bool, default=True
-        "voxnet" computes in bfloat16, all but its last layer.
+        "voxnet" computes in bfloat16, all but its last layer, where the device has instructions
+        for it: CPUs that have none take ten times as long as with float32.
     augment : bool, default=False
         "voxnet" learns each packed grid turned about z by a multiple of 90 degrees and mirrored
         at random.

@@ -331,10 +331,11 @@ def restore(
     """Build a trained module for inference from its state, on the CPU if the device is not here."""
     restored: Any = module(**module_parameters)
     restored.load_state_dict({name: torch.from_numpy(array) for name, array in state.items()})
+    here = device if torch.cuda.is_available() or not device.startswith("cuda") else "cpu"
+    restored.eval().to(here)
     if hasattr(restored, "for_inference"):
         restored.for_inference()
-    here = device if torch.cuda.is_available() or not device.startswith("cuda") else "cpu"
-    return restored.eval().to(here)
+    return restored
 
 
 def logits(module: nn.Module, rows: NDArray[Any]) -> NDArray[np.float32]:

@@ -10,6 +10,8 @@ from reliability.grid_shapes import LEAST_SIDE, grid_shape
 from reliability.voxel_kernels import fill_grids
 
 N_SYMMETRIES = 8
+# What torch calls the instructions, on x86 and on ARM.
+_BFLOAT16 = ("avx512_bf16", "amx_bf16", "bf16")
 _COLUMN_TYPES = {16: torch.int16, 32: torch.int32, 64: torch.int64}
 
 
@@ -38,6 +40,14 @@ class Dropout(nn.Module):
         return inputs * torch.as_strided(kept, inputs.shape, inputs.stride())
 
 
+class FlattenToDouble(nn.Flatten):
+    """Flattens, for a layer whose sums shall not depend on how many rows there are."""
+
+    def forward(self, inputs: Tensor) -> Tensor:
+        """Flatten all but the first dimension."""
+        return super().forward(inputs).double()
+
+
 class VoxNet(nn.Module):
     """The paper's network for the rope, with the dropout of the authors' public code.
 
@@ -55,7 +65,7 @@ class VoxNet(nn.Module):
         Side of the cubes of cells of which the network sees the mean, in the first channel, or
         the maximum, in the others.
     mixed_precision : bool
-        Compute all but the last layer in bfloat16.
+        Compute all but the last layer in bfloat16, on devices that have instructions for it.
     augment : bool
         In training, turn each grid about z and mirror it at random.
     """
@@ -92,21 +102,28 @@ class VoxNet(nn.Module):
 
     def forward(self, rows: Tensor) -> Tensor:
         """Map (n, n_features) rows to (n, 1) logits."""
+        if len(rows) == 1 and not self.training:
+            # Of one grid alone torch sums in another order than of several.
+            return self(rows.repeat(2, 1))[:1]
         if self.training and self.augment:
             draws = torch.randint(N_SYMMETRIES, (len(rows),)).to(rows.device)
             rows = transformed(rows, self.channels, self.side, draws)
         dtype = next(self.layers.parameters()).dtype
         grids = self.grids(rows).to(dtype)
-        automatic = self.mixed_precision and dtype == torch.float32
+        automatic = dtype == torch.float32 and self._in_bfloat16(rows.device)
         with torch.autocast(rows.device.type, torch.bfloat16, enabled=automatic):
             hidden = self.layers(grids)
         return self.head(hidden.to(self.head.weight.dtype)).float()
 
     def for_inference(self) -> None:
-        """Round the weights once instead of at each call, and sum up logits beyond rounding."""
-        if self.mixed_precision:
+        """Round weights once instead of at each call, and sum so that batches do not matter."""
+        self.head.double()
+        if self._in_bfloat16(self.head.weight.device):
             self.layers.to(torch.bfloat16)
-            self.head.double()
+        else:
+            first = next(i for i, layer in enumerate(self.layers) if isinstance(layer, nn.Flatten))
+            self.layers[first] = FlattenToDouble()
+            self.layers[first + 1].double()
 
     def grids(self, rows: Tensor) -> Tensor:
         """Return what the first layer sees of rows, float32 of shape (n, channels, x, y, z)."""
@@ -117,6 +134,17 @@ class VoxNet(nn.Module):
         if rows.device.type == "cpu":
             return unpacked(rows, self.channels, self.side, self.pooling)
         return unpacked_on_device(rows, self.channels, self.side, self.pooling)
+
+    def _in_bfloat16(self, device: torch.device) -> bool:
+        return self.mixed_precision and computes_bfloat16(device)
+
+
+def computes_bfloat16(device: torch.device) -> bool:
+    """Tell whether a device has instructions for bfloat16; if not, it is slow."""
+    if device.type == "cuda":
+        return torch.cuda.is_bf16_supported(including_emulation=False)
+    has = torch.cpu.get_capabilities()
+    return device.type == "cpu" and any(has.get(name, False) for name in _BFLOAT16)
 
 
 def smallest_side(n_numbers: int) -> int:

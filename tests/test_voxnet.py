@@ -197,6 +197,20 @@ def test_a_rows_logit_is_the_same_in_every_batch_but_for_rounding(pooling, augme
     assert network.history_[0]["train_loss"] > 0
 
 
+def test_precision_is_mixed_only_where_the_cpu_computes_with_bfloat16(monkeypatch):
+    X, y = hits(40, side=32)
+    network = voxnet(max_epochs=1, rows_per_epoch=32, pooling=2, mixed_precision=False).fit(X, y)
+    full = network.decision_function(X)
+    answers = {}
+    for instructions in ({}, {"avx512_bf16": False}, {"avx512_bf16": True}, {"bf16": True}):
+        monkeypatch.setattr(torch.cpu, "get_capabilities", lambda found=instructions: found)
+        mixed = voxnet(max_epochs=1, rows_per_epoch=32, pooling=2).fit(X, y)
+        answers[any(instructions.values())] = mixed.decision_function(X)
+        np.testing.assert_allclose(mixed.decision_function(X), full, atol=0.05)
+    np.testing.assert_array_equal(answers[False], full)
+    assert not np.array_equal(answers[True], full)
+
+
 def test_a_model_on_disk_is_small_and_the_same(data, fitted, tmp_path):
     X, _ = data
     joblib.dump(fitted, tmp_path / "model.joblib")
