@@ -10,23 +10,21 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from pathlib import Path
 
 import joblib
 import numpy as np
 from table1 import COLUMNS, UNCLASSIFIED
-from table1_trials import MAX_ITERATIONS, TOLERANCE
+from table1_trials import MAX_ITERATIONS, TOLERANCE, model_at
 
 from planners import BiasedRRT
-from reliability import load_estimator
 from systems import Rope, Scene, SimulationDivergedError, random_rope_scene
+from systems.random_rope_scenes import has_slot_and_slit
 
 SEED = 2026
 K = 10.0
 # Without a classifier a plan is found in a few seconds, if there is a way.
 SECONDS_WITHOUT = 10.0
 OUTCOMES = ("right", "wrong", "no plan")
-SLOT_AND_SLIT = {"lower slotted wall", "lower wall"}
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -53,7 +51,7 @@ def main(arguments: list[str] | None = None) -> None:
 def plan_in_hall(i: int, columns: list[str], time_limit: float) -> dict[str, str]:
     """Return what becomes of each column's plan; nothing if the hall does not count."""
     scene = random_rope_scene(np.random.SeedSequence([SEED, i]))
-    if not {obstacle.name for obstacle in scene.obstacles} >= SLOT_AND_SLIT:
+    if not has_slot_and_slit(scene):
         return {}
     try:
         if outcome(scene, "none", i, SECONDS_WITHOUT) != "wrong":
@@ -67,8 +65,7 @@ def plan_in_hall(i: int, columns: list[str], time_limit: float) -> dict[str, str
 
 def outcome(scene: Scene, name: str, seed: int, time_limit: float) -> str:
     """Plan and execute once."""
-    path: Path | None = COLUMNS[name]
-    estimator = None if path is None else load_estimator(path)
+    estimator = model_at(COLUMNS[name])
     features = UNCLASSIFIED.get(name) or estimator.provenance_["features"]
     rope = Rope(scene, features=features)
     problem = rope.scene_problem()

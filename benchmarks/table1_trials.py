@@ -27,7 +27,8 @@ def _scene(name: str, engine: str, features: str) -> tuple[Rope, Problem, np.nda
 
 
 @cache
-def _model(path: Path | None) -> Any:
+def model_at(path: Path | None) -> Any:
+    """Load an estimator once; None for none."""
     return None if path is None else load_estimator(path)
 
 
@@ -46,7 +47,7 @@ def run_trial(
     file = folder / name / f"seed-{seed:03d}.json"
     if file.exists():
         return dict(json.loads(file.read_text()))
-    estimator = _model(model)
+    estimator = model_at(model)
     features = getattr(estimator, "provenance_", {}).get("features", features)
     rope, problem, start = _scene(name, options.engine, features)
     planner = BiasedRRT(

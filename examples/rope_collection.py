@@ -13,6 +13,7 @@ import numpy as np
 from planners import BiasedRRT
 from reliability import RELIABLE, Transitions, collect_transitions
 from systems import Problem, Rope, Scene, random_rope_scene
+from systems.random_rope_scenes import has_slot_and_slit
 from systems.rope_scenes import load_scene
 from systems.validation import RandomState
 
@@ -107,14 +108,10 @@ def random_scene(i: int) -> Scene:
     return random_rope_scene(np.random.SeedSequence([RANDOM_SCENE_SEED, i]))
 
 
-def _is_slotted(scene: Scene) -> bool:
-    return {"lower slotted wall", "lower wall"} <= {obstacle.name for obstacle in scene.obstacles}
-
-
 def _collect_scene(folder: Path, i: int, plan: Round, estimator: Any) -> SceneData | None:
     rope = RopeFromItsStart(random_scene(i))
     file, empty = folder / f"scene-{i:05d}.npz", folder / f"scene-{i:05d}.empty"
-    if empty.exists() or (plan.slotted and not _is_slotted(rope.scene)):
+    if empty.exists() or (plan.slotted and not has_slot_and_slit(rope.scene)):
         return None
     if not file.exists():
         first = _plans_from_start(rope, None, 1, i)

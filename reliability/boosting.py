@@ -67,7 +67,7 @@ class FastHistGradientBoostingClassifier(HistGradientBoostingClassifier):
         if not hasattr(self, "_nodes"):
             self._nodes = _numbered_together([tree.nodes for (tree,) in self._predictors])
         rows = np.ascontiguousarray(X, dtype=np.float64)
-        return boosted_sums(rows, float(self._baseline_prediction.item()), *self._nodes)
+        return boosted_sums(rows, self._baseline_prediction.item(), *self._nodes)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what is rebuilt from the trees."""

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import expit
 from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import check_is_fitted, validate_data
@@ -319,7 +320,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         decision = self.decision_function(X).astype(np.float64)
         if len(self.classes_) == 1:
             return np.ones((len(decision), 1))
-        second = np.exp(-np.logaddexp(0.0, -decision))
+        second = expit(decision)
         return np.column_stack([1 - second, second])
 
     def predict(self, X: ArrayLike) -> NDArray[Any]:

@@ -45,6 +45,11 @@ def random_rope_scene(random_state: RandomState = None) -> Scene:
     raise RuntimeError("No scene has its start and goal clear of obstacles.")
 
 
+def has_slot_and_slit(scene: Scene) -> bool:
+    """Tell whether a random scene's rope must pass a slotted wall and the slit of another."""
+    return {"lower slotted wall", "lower wall"} <= {obstacle.name for obstacle in scene.obstacles}
+
+
 def _draw_scene(rng: np.random.Generator) -> Scene:
     links = int(rng.integers(LEAST_LINKS, MOST_LINKS + 1))
     length = (links - 1) * NODE_SPACING
