@@ -4,13 +4,13 @@ ENV := .venv
 RUN := $(ENV)/bin/python
 
 arm: $(ENV)/ready ## no data to the arm's table and pictures, in build/arm
-	$(RUN) examples/arm.py
+	$(RUN) -m benchmarks.arm
 
 rope: $(ENV)/ready ## a rope that gets caught and one that does not, in build/rope
-	$(RUN) examples/rope.py
+	$(RUN) -m benchmarks.rope
 
 car: $(ENV)/ready ## no data to the car's tables and pictures, in build/car
-	$(RUN) examples/car.py
+	$(RUN) -m benchmarks.car
 
 test: $(ENV)/ready check ## style, types and tests
 	$(RUN) -m pytest
@@ -21,7 +21,7 @@ check: $(ENV)/ready
 	$(RUN) -m mypy
 
 bench: $(ENV)/ready ## ratios behind the README's claims
-	$(RUN) benchmarks/planning.py
+	$(RUN) -m benchmarks.speed.arm
 
 env: $(ENV)/ready
 

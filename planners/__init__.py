@@ -9,7 +9,7 @@ from planners.result import PlanResult, PlanStatus
 
 if TYPE_CHECKING:
     from planners.check_transition import CheckTransition
-    from planners.repeated import likeliest_plan
+    from planners.restarts import best_of_restarts
     from planners.rrt import BiasedRRT
     from planners.rrt_connect import BiasedRRTConnect
 
@@ -19,14 +19,14 @@ __all__ = [
     "CheckTransition",
     "PlanResult",
     "PlanStatus",
-    "likeliest_plan",
+    "best_of_restarts",
 ]
 
 _HOMES = {
     "BiasedRRT": "planners.rrt",
     "BiasedRRTConnect": "planners.rrt_connect",
     "CheckTransition": "planners.check_transition",
-    "likeliest_plan": "planners.repeated",
+    "best_of_restarts": "planners.restarts",
 }
 
 

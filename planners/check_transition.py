@@ -114,7 +114,7 @@ class CheckTransition:
             return np.ones(len(reduced))
         return self._probability(self._system.features(reduced, next_reduced))
 
-    def appraise(self, reduced: Array, next_reduced: Array) -> tuple[NDArray[np.bool_], Array]:
+    def evaluate(self, reduced: Array, next_reduced: Array) -> tuple[NDArray[np.bool_], Array]:
         """Return :meth:`classify` and :meth:`probability` in one."""
         if self._estimator is None or len(reduced) == 0:
             return np.ones(len(reduced), dtype=np.bool_), np.ones(len(reduced))
@@ -148,8 +148,8 @@ class CheckTransition:
         return predicted == self._estimator.classes_[self._reliable_column]
 
 
-def doubts(probability: Array) -> Array:
-    """Return -log of the probability that a transition is Reliable; doubts of a plan add up."""
+def negative_log_likelihood(probability: Array) -> Array:
+    """Return -log of the probability that a transition is Reliable; a plan's add up."""
     return -np.log(np.maximum(probability, 1e-12))
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.check_transition import CheckTransition, doubts
-from planners.edges import split_edges
+from planners.check_transition import CheckTransition, negative_log_likelihood
+from planners.edge_discretization import split_edges
 from systems.system import Array, System
 
 
@@ -47,7 +47,7 @@ class EdgeChecker:
         edges = [np.stack([starts[a], ends[a]], axis=1) for starts, ends, a in self._accepted]
         return np.concatenate([np.empty((0, 2, self._system.reduced_dim)), *edges])
 
-    def appraise(self, starts: Array, ends: Array) -> tuple[NDArray[np.bool_], Array]:
+    def evaluate(self, starts: Array, ends: Array) -> tuple[NDArray[np.bool_], Array]:
         """Judge edges without any draws.
 
         Returns
@@ -58,14 +58,14 @@ class EdgeChecker:
             The edge's part in -log of the probability that all goes well.
         """
         possible, origins, following, edge = self._propagate(starts, ends)
-        reliable, probability = self._check.appraise(origins, following)
+        reliable, probability = self._check.evaluate(origins, following)
         doubt = np.zeros(len(starts))
-        np.add.at(doubt, edge, doubts(probability))
+        np.add.at(doubt, edge, negative_log_likelihood(probability))
         return _all_per_edge(possible, edge, reliable), doubt
 
-    def doubts(self, reduced: Array, next_reduced: Array) -> Array:
+    def negative_log_likelihood(self, reduced: Array, next_reduced: Array) -> Array:
         """Return -log of the probability that each transition is Reliable, shape (n,)."""
-        return doubts(self._check.probability(reduced, next_reduced))
+        return negative_log_likelihood(self._check.probability(reduced, next_reduced))
 
     def _propagate(
         self, starts: Array, ends: Array

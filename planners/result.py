@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.archive import read_arrays, write_arrays
+from reliability.archive import read_arrays, write_arrays
 
 FORMAT_VERSION = 1
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ class PlanResult:
         return self.status is PlanStatus.SOLVED
 
     @property
-    def promise(self) -> float:
+    def success_probability(self) -> float:
         """Probability that all transitions are Reliable, if they don't depend on one another.
 
         1 without an estimator, and 0 without a plan.

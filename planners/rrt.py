@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from planners.batch_rrt import BatchRRT
 from planners.biased_planner import BiasedPlanner, Found, Search
-from planners.carried_shortcut import CarriedShortcuts, Path
 from planners.edge_checker import EdgeChecker
-from planners.lockstep_rrt import LockstepRRT
 from planners.ompl_search import search_as_planner
 from planners.result import PlanStatus
-from planners.shortcut import shorten
+from planners.shortcutting import shorten
+from planners.shortcutting_repropagated import Path, RepropagatedShortcuts
 from systems.system import Array, System
 from systems.validation import RandomState
 
@@ -75,7 +75,7 @@ class BiasedRRT(BiasedPlanner):
         self.random_state = random_state
 
     def _search(self, search: Search) -> Found:
-        rrt = LockstepRRT(self.system, search.start, search.goals, search.check, search.rng)
+        rrt = BatchRRT(self.system, search.start, search.goals, search.check, search.rng)
         status, _ = search_as_planner(
             self.system.bounds,
             search.start[: self.system.configuration_dim],
@@ -98,7 +98,7 @@ class BiasedRRT(BiasedPlanner):
 
     def _shortened(self, path: Array, commands: Array, search: Search) -> tuple[Array, Array]:
         if self.system.configuration_dim < self.system.reduced_dim:
-            shortcuts = CarriedShortcuts(self.system, search.goals, search.check, search.rng)
+            shortcuts = RepropagatedShortcuts(self.system, search.goals, search.check, search.rng)
             shortened = shortcuts.shorten(Path(path, commands))
             return shortened.reduced, shortened.commands
         checker = EdgeChecker(self.system, search.check)

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from planners.batch_rrt_connect import BatchRRTConnect
 from planners.biased_planner import BiasedPlanner, Found, Search
 from planners.edge_checker import EdgeChecker
-from planners.edges import split_edges
-from planners.lockstep_rrt_connect import LockstepRRTConnect
+from planners.edge_discretization import split_edges
 from planners.ompl_search import rrt_connect, search_as_planner
 from planners.result import PlanStatus
-from planners.shortcut import shorten
+from planners.shortcutting import shorten
 from systems.system import Array, System
 from systems.validation import RandomState, check_count
 
@@ -125,10 +125,8 @@ class BiasedRRTConnect(BiasedPlanner):
                 budget=search.budget,
                 seed=search.ompl_seed,
             )
-        lockstep = LockstepRRTConnect(
-            *problem, checker, longest_edge, self.system.angular, search.rng
-        )
-        return search_as_planner(*problem, lockstep, budget=search.budget, seed=search.ompl_seed)
+        batch = BatchRRTConnect(*problem, checker, longest_edge, self.system.angular, search.rng)
+        return search_as_planner(*problem, batch, budget=search.budget, seed=search.ompl_seed)
 
 
 def _transition_states(vertices: Array, system: System) -> Array:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reliability.grid_shapes import LEAST_SIDE, SIDES, grid_shape
+from reliability.voxel_format import LEAST_SIDE, SIDES, grid_shape
 from systems.validation import check_count, check_number
 
 _MLP = {

@@ -22,7 +22,7 @@ class FastHistGradientBoostingClassifier(HistGradientBoostingClassifier):
 
     Parameters, attributes and all answers are scikit-learn's. There a call takes half a
     millisecond, whether for one row or for fifty; :meth:`fast_decision_function`, through which
-    planners ask, takes a few microseconds per row (``benchmarks/rope.py``).
+    planners ask, takes a few microseconds per row (``benchmarks.speed.rope``).
     """
 
     def fit(

@@ -23,23 +23,23 @@ class Summary:
         Plans that gave a transition.
     unreliable_share : float
         Of all transitions.
-    first_mistake_share : float
+    divergence_onset_share : float
         Share of the Unreliable transitions where prediction and execution part; in the others
         they had parted before. NaN without any Unreliable one.
-    faultless_share : float
+    reliable_plan_share : float
         Plans all of whose transitions are Reliable.
     transitions_per_plan : ndarray of int of shape (n_plans,)
-    reliable_before_mistake : ndarray of int
+    reliable_before_divergence : ndarray of int
         Transitions that went well before the first mistake, of each plan that has one.
     """
 
     n_transitions: int
     n_plans: int
     unreliable_share: float
-    first_mistake_share: float
-    faultless_share: float
+    divergence_onset_share: float
+    reliable_plan_share: float
     transitions_per_plan: NDArray[np.int64]
-    reliable_before_mistake: NDArray[np.int64]
+    reliable_before_divergence: NDArray[np.int64]
 
     @classmethod
     def of(cls, transitions: Transitions) -> Summary:
@@ -56,22 +56,22 @@ class Summary:
         np.minimum.at(first, number[unreliable], transitions.step[unreliable])
         spoilt = np.isin(np.arange(len(plans)), number[unreliable])
         n_unreliable = int(unreliable.sum())
-        n_first = int(transitions.first_mistakes().sum())
+        n_first = int(transitions.divergence_onsets().sum())
         return cls(
             n_transitions=len(transitions),
             n_plans=len(plans),
             unreliable_share=float(unreliable.mean()),
-            first_mistake_share=n_first / n_unreliable if n_unreliable else float("nan"),
-            faultless_share=float(1 - spoilt.mean()),
+            divergence_onset_share=n_first / n_unreliable if n_unreliable else float("nan"),
+            reliable_plan_share=float(1 - spoilt.mean()),
             transitions_per_plan=sizes,
-            reliable_before_mistake=first[spoilt],
+            reliable_before_divergence=first[spoilt],
         )
 
     def __str__(self) -> str:
         """Tell the numbers in a few lines."""
         low, middle, high = np.quantile(self.transitions_per_plan, (0.1, 0.5, 0.9))
         of_those = (
-            f"; {self.first_mistake_share:.1%} of those are first mistakes, the others follow one"
+            f"; {self.divergence_onset_share:.1%} of those are divergence onsets, the others follow one"
             if self.unreliable_share
             else ""
         )
@@ -80,7 +80,7 @@ class Summary:
             f"{self.transitions_per_plan.mean():.1f} a plan, {middle:.0f} in the median, "
             f"{low:.0f} to {high:.0f} in four fifths.\n"
             f"{self.unreliable_share:.1%} are Unreliable{of_those}.\n"
-            f"{self.faultless_share:.1%} of the plans are Reliable from start to end."
+            f"{self.reliable_plan_share:.1%} of the plans are Reliable from start to end."
         )
 
     def plot(self, axes: Any = None) -> Any:
@@ -103,10 +103,10 @@ class Summary:
         bins = np.linspace(0, most, min(most, 40) + 1)
         axes[0].hist(self.transitions_per_plan, bins, color="tab:blue")
         axes[0].set(xlabel="transitions per plan", ylabel="plans")
-        axes[1].hist(self.reliable_before_mistake, bins, color="tab:red")
+        axes[1].hist(self.reliable_before_divergence, bins, color="tab:red")
         axes[1].set(xlabel="Reliable transitions before the first mistake")
         axes[1].set_title(
-            f"{1 - self.faultless_share:.0%} of plans have one; "
+            f"{1 - self.reliable_plan_share:.0%} of plans have one; "
             f"{self.unreliable_share:.0%} of transitions are Unreliable",
             fontsize="medium",
         )

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reliability.archive import read_arrays, write_arrays
 from reliability.labels import RELIABLE, UNRELIABLE
-from reliability.packed_rows import PackedRows, as_bits
-from systems.archive import read_arrays, write_arrays
+from reliability.trimmed_rows import TrimmedRows, as_bits
 from systems.system import System
 from systems.validation import check_count
 
@@ -62,12 +62,12 @@ class Transitions:
         follows_on[:-1] = (ends == starts).all(axis=1)
         both = np.stack([reduced, next_reduced], axis=1)
         kept = np.stack([np.ones_like(follows_on), ~follows_on], axis=1)
-        self._states = PackedRows.pack(both[kept])
+        self._states = TrimmedRows.pack(both[kept])
         self._first = _first_states(follows_on)
 
     @classmethod
     def _of_states(
-        cls, states: PackedRows, first: NDArray[np.int64], columns: dict[str, NDArray[Any]]
+        cls, states: TrimmedRows, first: NDArray[np.int64], columns: dict[str, NDArray[Any]]
     ) -> Transitions:
         made = cls.__new__(cls)
         made._states, made._first = states, first
@@ -109,7 +109,7 @@ class Transitions:
         states = self._states.take(pairs[kept])
         return self._of_states(states, _first_states(follows_on), columns)
 
-    def up_to_last_mistake(self, n_after: int) -> Transitions:
+    def trim_unreliable_tail(self, n_after: int) -> Transitions:
         """Leave out what each plan did long after its execution went astray for good.
 
         From the mistake on that an execution never recovers from, all is Unreliable, whatever it
@@ -135,7 +135,7 @@ class Transitions:
         """Join transitions end to end; plan ids are kept as they are."""
         if not parts:
             raise ValueError("parts must hold at least one Transitions, got none.")
-        states = PackedRows.concatenate([part._states for part in parts])
+        states = TrimmedRows.concatenate([part._states for part in parts])
         n_before = np.cumsum([0, *(len(part._states) for part in parts)])
         first = [part._first + n for part, n in zip(parts, n_before[:-1], strict=True)]
         columns = {
@@ -162,7 +162,7 @@ class Transitions:
         first = self._first[rows]
         return system.features(self._states.unpack(first), self._states.unpack(first + 1))
 
-    def first_mistakes(self) -> NDArray[np.bool_]:
+    def divergence_onsets(self) -> NDArray[np.bool_]:
         """Tell where execution and prediction part, from where they had already parted.
 
         Returns
@@ -193,7 +193,7 @@ class Transitions:
         """
         names = {"first", *_COLUMNS, *_STATES}
         arrays = read_arrays(path, names, format_version=FORMAT_VERSION, kind="transitions")
-        states = PackedRows(arrays["values"], arrays["lengths"], int(arrays["width"]))
+        states = TrimmedRows(arrays["values"], arrays["lengths"], int(arrays["width"]))
         return cls._of_states(states, arrays["first"], arrays)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from reliability.grid_shapes import LEAST_SIDE, grid_shape
+from reliability.voxel_format import LEAST_SIDE, grid_shape
 from reliability.voxel_kernels import fill_grids
 
 N_SYMMETRIES = 8

@@ -9,15 +9,15 @@ from systems.errors import SimulationDivergedError, SystemContractError
 from systems.system import Problem, Rollout, StopReason, System
 
 if TYPE_CHECKING:
-    from systems.car import Car
-    from systems.car_scenes import CarScene, Circle, ConvexPolygon, random_car_scene
-    from systems.contract_checks import check_system
-    from systems.obstacles import Box, Capsule, Cylinder
-    from systems.planar_arm import PlanarArm
-    from systems.random_rope_scenes import random_rope_scene
-    from systems.rope import Rope
-    from systems.rope_scene import Scene
-    from systems.rope_scenes import load_scene
+    from systems.car.car import Car
+    from systems.car.scenes import CarScene, Circle, ConvexPolygon, random_car_scene
+    from systems.check_system import check_system
+    from systems.planar_arm.planar_arm import PlanarArm
+    from systems.rope.obstacles.shapes import Box, Capsule, Cylinder
+    from systems.rope.paper_scenes import load_scene
+    from systems.rope.random_scenes import random_rope_scene
+    from systems.rope.rope import Rope
+    from systems.rope.scene import Scene
 
 __all__ = [
     "Box",
@@ -43,20 +43,20 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Box": "systems.obstacles",
-    "Capsule": "systems.obstacles",
-    "Car": "systems.car",
-    "CarScene": "systems.car_scenes",
-    "Circle": "systems.car_scenes",
-    "ConvexPolygon": "systems.car_scenes",
-    "Cylinder": "systems.obstacles",
-    "PlanarArm": "systems.planar_arm",
-    "Rope": "systems.rope",
-    "Scene": "systems.rope_scene",
-    "check_system": "systems.contract_checks",
-    "load_scene": "systems.rope_scenes",
-    "random_car_scene": "systems.car_scenes",
-    "random_rope_scene": "systems.random_rope_scenes",
+    "Box": "systems.rope.obstacles.shapes",
+    "Capsule": "systems.rope.obstacles.shapes",
+    "Car": "systems.car.car",
+    "CarScene": "systems.car.scenes",
+    "Circle": "systems.car.scenes",
+    "ConvexPolygon": "systems.car.scenes",
+    "Cylinder": "systems.rope.obstacles.shapes",
+    "PlanarArm": "systems.planar_arm.planar_arm",
+    "Rope": "systems.rope.rope",
+    "Scene": "systems.rope.scene",
+    "check_system": "systems.check_system",
+    "load_scene": "systems.rope.paper_scenes",
+    "random_car_scene": "systems.car.scenes",
+    "random_rope_scene": "systems.rope.random_scenes",
 }
 
 

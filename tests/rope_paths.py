@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from systems.rope_scenes import load_scene
+from systems.rope.paper_scenes import load_scene
 
 STEP = 0.025
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from systems.band import (
+from systems.errors import SimulationDivergedError
+from systems.rope.band.band import (
     CLOSE_DISTANCE,
     band_distance,
     band_length,
@@ -19,12 +20,11 @@ from systems.band import (
     resample_bands,
     same_homotopy_class,
 )
-from systems.contraction_kernels import CLEARANCE
-from systems.distance import signed_distance, signed_distance_and_gradient
-from systems.errors import SimulationDivergedError
-from systems.obstacles import Box, Cylinder
-from systems.rope_scene import GRIPPER_CLEARANCE, Scene
-from systems.rope_scenes import SCENE_NAMES, load_scene
+from systems.rope.band.contraction_kernels import CLEARANCE
+from systems.rope.obstacles.shapes import Box, Cylinder
+from systems.rope.obstacles.signed_distance import signed_distance, signed_distance_and_gradient
+from systems.rope.paper_scenes import SCENE_NAMES, load_scene
+from systems.rope.scene import GRIPPER_CLEARANCE, Scene
 
 STEP = 0.025
 # Where two bubbles of the smallest size meet, so much is free between them.

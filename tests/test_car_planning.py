@@ -1,19 +1,14 @@
 """Planning for the car: headings that wrap, and plans that the example makes safer."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.car.compared_planners import TrueCar, plan_query
+from benchmarks.car.waypoints import move_waypoints
 from planners import BiasedRRT, BiasedRRTConnect
 from systems import Car, CarScene, Circle, Problem, random_car_scene
-
-sys.path.append(str(Path(__file__).parents[1] / "examples"))
-from car_planners import TrueCar, plan_query
-from car_waypoints import move_waypoints
 
 BEHIND = CarScene((Circle(3.0, 2.0, 0.4),), (0.0, 0.0, 6.0, 4.0))
 BOTH = pytest.mark.parametrize("planner_class", [BiasedRRT, BiasedRRTConnect])
@@ -72,7 +67,7 @@ def test_moved_waypoints_are_never_less_reliable(seed):
     planner = BiasedRRTConnect(car, classifier, k=np.inf, max_iterations=500, random_state=seed)
     plan = planner.plan(problem.start[:3], problem.goal)
     moved = move_waypoints(car, classifier, plan, seed)
-    assert moved.promise >= plan.promise * (1 - 1e-6)
+    assert moved.success_probability >= plan.success_probability * (1 - 1e-6)
     if plan.success:
         np.testing.assert_array_equal(moved.reduced[[0, -1]], plan.reduced[[0, -1]])
         following, valid = car.propagate(moved.reduced[:-1], moved.commands)

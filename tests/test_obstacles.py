@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from systems.distance import signed_distance, signed_distance_and_gradient
-from systems.obstacles import Box, Capsule, Cylinder, pack_obstacles
+from systems.rope.obstacles.shapes import Box, Capsule, Cylinder, pack_obstacles
+from systems.rope.obstacles.signed_distance import signed_distance, signed_distance_and_gradient
 
 coordinate = st.floats(-1.0, 1.0)
 point = st.tuples(coordinate, coordinate, coordinate)

@@ -9,11 +9,11 @@ import pytest
 from planners import BiasedRRT
 from reliability import collect_transitions
 from systems import Box, Rope, Scene, check_system
-from systems.band import band_length, reduced_dim
-from systems.distance import signed_distance
-from systems.rope_scene import GRIPPER_CLEARANCE
-from systems.rope_scenes import SCENE_NAMES
-from systems.rope_state import RopeState
+from systems.rope.band.band import band_length, reduced_dim
+from systems.rope.obstacles.signed_distance import signed_distance
+from systems.rope.paper_scenes import SCENE_NAMES
+from systems.rope.scene import GRIPPER_CLEARANCE
+from systems.rope.simulation.state import RopeState
 
 
 @pytest.fixture(scope="module")
@@ -184,7 +184,7 @@ def test_collected_data_are_compact_and_resume(rope, tmp_path):
     assert data.features(Rope(features="vector")).shape == (len(data), 13)
 
 
-WIDTHS = {"voxels": 12288, "curtain": 496, "vector": 13}
+WIDTHS = {"voxels": 12288, "clearance": 496, "vector": 13}
 
 
 @pytest.mark.parametrize("features", WIDTHS)
@@ -215,7 +215,7 @@ def test_ropes_pickle_and_hash_alike_before_and_after_use(rope):
         ({"scene": "no_hook"}, "scene must be one of simple_hook_short"),
         ({"scene": 3}, "scene must be a Scene or the name of one, got 3"),
         ({"engine": "bullet"}, "engine must be one of mujoco, pybullet, got 'bullet'"),
-        ({"features": "pixels"}, "features must be one of voxels, curtain, vector, got 'pixels'"),
+        ({"features": "pixels"}, "features must be one of voxels, clearance, vector, got 'pixels'"),
     ],
 )
 def test_unknown_scenes_and_engines_are_refused(arguments, message):

@@ -1,13 +1,9 @@
-"""The rope's random halls: which are planned in, and that none is planned in again."""
-
-import sys
-from pathlib import Path
+"""The rope's random scenes: which are planned in, and that none is planned in again."""
 
 import numpy as np
 import pytest
 
-sys.path.append(str(Path(__file__).parents[1] / "examples"))
-from rope_collection import (
+from benchmarks.rope.collection import (
     Round,
     SceneData,
     as_far_as_allowed,
@@ -15,7 +11,6 @@ from rope_collection import (
     described,
     random_scene,
 )
-
 from reliability import UNRELIABLE
 from systems import Rope
 
@@ -54,9 +49,9 @@ def test_what_is_there_is_not_collected_again(found, folder):
 
 def test_plans_are_cut_where_g_does_not_allow_them(found):
     data, kept = found.transitions, as_far_as_allowed(found).transitions
-    rope = Rope(found.scene, features="curtain")
+    rope = Rope(found.scene, features="clearance")
     _, valid = rope.propagate(data.reduced, data.command)
-    assert not valid.all(), "where the plan goes wrong a loose rope is overstretched"
+    assert not valid.all(), "where the plan goes wrong a PBD rope is overstretched"
     assert rope.propagate(kept.reduced, kept.command)[1].all()
     for plan in np.unique(data.plan):
         n = np.argmin(np.append(valid[data.plan == plan], False))
@@ -69,7 +64,7 @@ def test_plans_are_cut_where_g_does_not_allow_them(found):
 
 def test_plans_of_different_scenes_stay_apart_even_if_one_has_none(found):
     none = SceneData(found.scene, found.transitions[:0])
-    rows, labels, plans = described([found, none, found], "curtain")
+    rows, labels, plans = described([found, none, found], "clearance")
     n = len(found.transitions)
     assert len(rows) == len(labels) == len(plans) == 2 * n
     assert not set(plans[:n]) & set(plans[n:])

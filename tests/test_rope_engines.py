@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from rope_paths import PATHS, path_commands
 
-from systems.distance import signed_distance
 from systems.errors import SimulationDivergedError
-from systems.obstacles import Box, Capsule, Cylinder
-from systems.rope_rollout import ENGINES, RopeRollout, rope_length
-from systems.rope_scene import GRIPPER_RADIUS, ROPE_RADIUS, Scene, hanging_rope
-from systems.rope_scenes import SCENE_NAMES, load_scene
-from systems.rope_state import RopeState
+from systems.rope.obstacles.shapes import Box, Capsule, Cylinder
+from systems.rope.obstacles.signed_distance import signed_distance
+from systems.rope.paper_scenes import SCENE_NAMES, load_scene
+from systems.rope.scene import GRIPPER_RADIUS, ROPE_RADIUS, Scene, hanging_rope
+from systems.rope.simulation.quasistatic import ENGINES, RopeRollout, rope_length
+from systems.rope.simulation.state import RopeState
 from systems.system import StopReason
 
 RESTART_TOLERANCE = {"mujoco": 0.0, "pybullet": 1e-3}
@@ -296,8 +296,8 @@ def test_missing_pybullet_names_the_extra(monkeypatch):
 
 def test_no_engine_is_imported_before_it_is_needed():
     program = (
-        "import sys; from systems.rope_rollout import RopeRollout; "
-        "from systems.rope_scenes import load_scene; "
+        "import sys; from systems.rope.simulation.quasistatic import RopeRollout; "
+        "from systems.rope.paper_scenes import load_scene; "
         "RopeRollout(load_scene('simple_hook'), 'pybullet'); "
         "assert not {'mujoco', 'pybullet'} & set(sys.modules)"
     )

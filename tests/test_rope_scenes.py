@@ -5,16 +5,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from systems.distance import signed_distance
-from systems.obstacles import Box
-from systems.rope_scene import (
+from systems.rope.obstacles.shapes import Box
+from systems.rope.obstacles.signed_distance import signed_distance
+from systems.rope.paper_scenes import SCENE_NAMES, load_scene
+from systems.rope.scene import (
     GRIPPER_CLEARANCE,
     GRIPPER_RADIUS,
     ROPE_RADIUS,
     Scene,
     hanging_rope,
 )
-from systems.rope_scenes import SCENE_NAMES, load_scene
 
 PAPER_LENGTHS = {
     "simple_hook_short": 0.55,

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from systems import Box, Capsule, Cylinder, Rope, Scene, check_system
-from systems.band import reduced_dim, resample_bands
-from systems.distance import signed_distance
-from systems.rope_scenes import SCENE_NAMES, load_scene
-from systems.rope_voxels import unpack_voxels, voxel_features
+from systems.rope.band.band import reduced_dim, resample_bands
+from systems.rope.features.voxels import unpack_voxels, voxel_features
+from systems.rope.obstacles.signed_distance import signed_distance
+from systems.rope.paper_scenes import SCENE_NAMES, load_scene
 
 
 def random_bands(scene, rng, n):

@@ -30,20 +30,20 @@ def test_it_counts_what_is_there():
     )
     assert (summary.n_transitions, summary.n_plans) == (16, 4)
     assert summary.unreliable_share == pytest.approx(6 / 16)
-    assert summary.first_mistake_share == pytest.approx(4 / 6)
-    assert summary.faultless_share == pytest.approx(1 / 4)
+    assert summary.divergence_onset_share == pytest.approx(4 / 6)
+    assert summary.reliable_plan_share == pytest.approx(1 / 4)
     np.testing.assert_array_equal(summary.transitions_per_plan, [4, 6, 4, 2])
-    np.testing.assert_array_equal(summary.reliable_before_mistake, [2, 1, 0])
+    np.testing.assert_array_equal(summary.reliable_before_divergence, [2, 1, 0])
     assert "16 transitions of 4 plans" in str(summary)
     assert "37.5% are Unreliable" in str(summary)
 
 
 def test_without_mistakes_there_is_no_first_one():
     summary = Summary.of(transitions_with([[RELIABLE] * 3]))
-    assert np.isnan(summary.first_mistake_share)
-    assert summary.faultless_share == 1.0
+    assert np.isnan(summary.divergence_onset_share)
+    assert summary.reliable_plan_share == 1.0
     assert "nan" not in str(summary)
-    assert len(summary.reliable_before_mistake) == 0
+    assert len(summary.reliable_before_divergence) == 0
 
 
 def test_it_draws_every_plan():

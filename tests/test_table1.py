@@ -1,16 +1,13 @@
 """Table I's benchmark: trials that resume, and a table beside the paper's."""
 
 import json
-import sys
-from pathlib import Path
 
 import joblib
 import numpy as np
 from sklearn.dummy import DummyClassifier
 from sklearn.ensemble import HistGradientBoostingClassifier
 
-sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
-import table1
+from benchmarks.rope import table1
 
 
 def test_processes_find_what_one_finds(tmp_path, capsys):
@@ -32,10 +29,10 @@ def test_processes_find_what_one_finds(tmp_path, capsys):
 
 def test_loose_ropes_without_a_classifier_are_a_column_of_their_own(tmp_path, capsys):
     options = ["--scenes", "engine_assembly", "--seeds", "1", "--out", str(tmp_path)]
-    table1.main([*options, "--columns", "none", "loose"])
+    table1.main([*options, "--columns", "none", "pbd"])
     rows = [line.split(" | ")[1:3] for line in capsys.readouterr().out.splitlines()[2:4]]
-    assert [name for name, _ in rows] == ["none", "loose"]
-    (none,), (loose,) = (tmp_path.glob(f"{name}-*/*/seed-000.json") for name in ("none", "loose"))
+    assert [name for name, _ in rows] == ["none", "pbd"]
+    (none,), (loose,) = (tmp_path.glob(f"{name}-*/*/seed-000.json") for name in ("none", "pbd"))
     found = [json.loads(file.read_text()) for file in (none, loose)]
     assert found[0]["n_nodes"] != found[1]["n_nodes"], "what is carried decides what is valid"
 

@@ -114,7 +114,7 @@ def test_first_mistakes_follow_reliable_transitions_of_the_same_plan():
     plan = np.array([0, 0, 0, 1, 1, 1, 2])
     step = np.array([0, 1, 2, 0, 1, 2, 0])
     zeros = np.zeros((7, 1))
-    first = Transitions(zeros, zeros, zeros, y, plan, step).first_mistakes()
+    first = Transitions(zeros, zeros, zeros, y, plan, step).divergence_onsets()
     assert first.tolist() == [False, True, False, True, False, True, False]
 
 
@@ -157,10 +157,10 @@ def test_what_plans_did_long_after_they_went_wrong_for_good_is_left_out():
     rows = np.arange(12.0)[order, None]
     data = Transitions(rows, rows, rows, y[order], plan[order], step[order])
     for n_after, left_out in ((1, [4, 5, 9, 11]), (2, [5])):
-        kept = data.up_to_last_mistake(n_after).reduced[:, 0]
+        kept = data.trim_unreliable_tail(n_after).reduced[:, 0]
         np.testing.assert_array_equal(np.sort(kept), np.delete(np.arange(12), left_out))
     all_reliable = data[data.y == RELIABLE]
-    assert len(all_reliable.up_to_last_mistake(1)) == len(all_reliable)
-    assert len(data[:0].up_to_last_mistake(1)) == 0
+    assert len(all_reliable.trim_unreliable_tail(1)) == len(all_reliable)
+    assert len(data[:0].trim_unreliable_tail(1)) == 0
     with pytest.raises(ValueError, match="n_after must be"):
-        data.up_to_last_mistake(0)
+        data.trim_unreliable_tail(0)

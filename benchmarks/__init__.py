@@ -1,0 +1,1 @@
+"""Experiments behind the tables, and ratios behind the claims about speed."""

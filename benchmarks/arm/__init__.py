@@ -1,0 +1,1 @@
+"""The paper's arm experiment: run ``python -m benchmarks.arm``."""

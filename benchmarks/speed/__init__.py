@@ -1,0 +1,1 @@
+"""Ratios behind the claims about speed, each measured side by side in one run."""

@@ -1,0 +1,1 @@
+"""The paper's torque-limited planar arm."""

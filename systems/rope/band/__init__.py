@@ -1,0 +1,1 @@
+"""The virtual elastic band: the rope pulled taut."""

@@ -1,0 +1,1 @@
+"""Features of rope transitions."""

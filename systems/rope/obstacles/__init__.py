@@ -1,0 +1,1 @@
+"""Obstacles of a rope scene and the distances to them."""

@@ -1,0 +1,145 @@
+"""Obstacles of a scene: boxes, cylinders and capsules, in metres in the world frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from systems.validation import as_finite_array
+
+Array = NDArray[np.float64]
+Point = tuple[float, float, float]
+
+BOX, CYLINDER, CAPSULE = 0.0, 1.0, 2.0
+PACKED_WIDTH = 8
+
+
+@dataclass(frozen=True)
+class Box:
+    """An axis-aligned box.
+
+    Attributes
+    ----------
+    center : array-like of shape (3,)
+    half_extents : array-like of shape (3,)
+        Half of the length of each side.
+    name : str
+        What messages and pictures call it.
+    """
+
+    center: Point
+    half_extents: Point
+    name: str = "box"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", _as_point(self.center, "Box.center"))
+        half_extents = _as_point(self.half_extents, "Box.half_extents")
+        for extent in half_extents:
+            _check_positive(extent, "Box.half_extents")
+        object.__setattr__(self, "half_extents", half_extents)
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A solid cylinder along one of the world's axes.
+
+    Attributes
+    ----------
+    center : array-like of shape (3,)
+    radius, half_length : float
+    axis : {0, 1, 2}
+        The axis it runs along: x, y or z.
+    name : str
+    """
+
+    center: Point
+    radius: float
+    half_length: float
+    axis: int = 2
+    name: str = "cylinder"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", _as_point(self.center, "Cylinder.center"))
+        _check_positive(self.radius, "Cylinder.radius")
+        _check_positive(self.half_length, "Cylinder.half_length")
+        if isinstance(self.axis, bool) or self.axis not in (0, 1, 2):
+            raise ValueError(f"Cylinder.axis must be 0 (x), 1 (y) or 2 (z), got {self.axis!r}.")
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """All points within ``radius`` of the segment from ``start`` to ``end``.
+
+    Attributes
+    ----------
+    start, end : array-like of shape (3,)
+    radius : float
+    name : str
+    """
+
+    start: Point
+    end: Point
+    radius: float
+    name: str = "capsule"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", _as_point(self.start, "Capsule.start"))
+        object.__setattr__(self, "end", _as_point(self.end, "Capsule.end"))
+        _check_positive(self.radius, "Capsule.radius")
+        if self.start == self.end:
+            raise ValueError(
+                f"Capsule.start and Capsule.end must differ, got {self.start} for both; "
+                "move one of them."
+            )
+
+
+Obstacle = Box | Cylinder | Capsule
+
+
+def pack_obstacles(obstacles: Sequence[Obstacle]) -> Array:
+    """Write obstacles as the table that :mod:`systems.rope.obstacles.signed_distance` reads.
+
+    Parameters
+    ----------
+    obstacles : sequence of Box, Cylinder or Capsule
+
+    Returns
+    -------
+    packed : ndarray of shape (n, 8)
+        Boxes first, then cylinders, then capsules, each in the given order.
+
+    Raises
+    ------
+    ValueError
+        If one of them is no obstacle.
+    """
+    for index, obstacle in enumerate(obstacles):
+        if not isinstance(obstacle, Box | Cylinder | Capsule):
+            raise ValueError(
+                f"obstacles[{index}] must be a Box, a Cylinder or a Capsule, got {obstacle!r}."
+            )
+    rows = sorted((_packed_row(obstacle) for obstacle in obstacles), key=lambda row: row[0])
+    return np.array(rows, dtype=np.float64).reshape(-1, PACKED_WIDTH)
+
+
+def _packed_row(obstacle: Obstacle) -> tuple[float, ...]:
+    if isinstance(obstacle, Box):
+        return (BOX, *obstacle.center, *obstacle.half_extents, 0.0)
+    if isinstance(obstacle, Cylinder):
+        shape = (float(obstacle.axis), obstacle.half_length, 0.0, obstacle.radius)
+        return (CYLINDER, *obstacle.center, *shape)
+    axis = (end - start for start, end in zip(obstacle.start, obstacle.end, strict=True))
+    return (CAPSULE, *obstacle.start, *axis, obstacle.radius)
+
+
+def _as_point(values: Point, name: str) -> Point:
+    x, y, z = as_finite_array(values, name, (3,)).tolist()
+    return (x, y, z)
+
+
+def _check_positive(value: float, name: str) -> None:
+    if not (np.ndim(value) == 0 and np.isfinite(value) and value > 0.0):
+        raise ValueError(f"{name} must be positive and finite, got {value!r}.")

@@ -1,0 +1,180 @@
+"""Pictures of a rope scene, rendered off screen with MuJoCo."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from systems.rope.obstacles.shapes import Array, Box, Capsule, Cylinder, Obstacle
+from systems.rope.scene import GRIPPER_RADIUS, ROPE_RADIUS, Scene
+
+Color = tuple[float, float, float, float]
+Image = NDArray[np.uint8]
+
+ROPE_COLOR: Color = (0.15, 0.65, 0.15, 1.0)
+BAND_COLOR: Color = (0.95, 0.60, 0.05, 1.0)
+_GRIPPER_COLOR: Color = (0.10, 0.25, 0.85, 1.0)
+_GOAL_COLOR: Color = (0.90, 0.10, 0.10, 0.6)
+_WALL_COLOR: Color = (0.55, 0.35, 0.75, 0.35)
+_OUTER_WALL_COLOR: Color = (0.55, 0.35, 0.75, 0.08)
+_FLOOR_COLOR: Color = (0.75, 0.75, 0.75, 1.0)
+_HOOK_COLOR: Color = (0.05, 0.50, 0.55, 1.0)
+_MAX_GEOMS = 5000
+
+
+class SceneRenderer:
+    """Renders one scene as often as wanted; use it as a context manager.
+
+    Without a display, MuJoCo needs ``MUJOCO_GL=egl`` (or ``osmesa``) in the environment before
+    it is first imported; here it is set to ``egl`` where neither it nor a display is.
+
+    Parameters
+    ----------
+    scene : Scene
+    width, height : int
+        Pixels.
+    azimuth, elevation : float
+        Direction of the camera's view, degrees.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        width: int = 960,
+        height: int = 640,
+        azimuth: float = 40.0,
+        elevation: float = -30.0,
+    ) -> None:
+        if sys.platform == "linux" and "DISPLAY" not in os.environ:
+            os.environ.setdefault("MUJOCO_GL", "egl")
+        import mujoco
+
+        self._scene = scene
+        model = mujoco.MjModel.from_xml_string(_model_xml(scene, width, height))
+        self._data = mujoco.MjData(model)
+        mujoco.mj_forward(model, self._data)
+        self._renderer = mujoco.Renderer(model, height, width, max_geom=_MAX_GEOMS)
+        self._camera = mujoco.MjvCamera()
+        low, high = scene.bounds
+        self._camera.lookat[:] = low + (high - low) * (0.5, 0.5, 0.25)
+        self._camera.distance = float(np.linalg.norm(high - low))
+        self._camera.azimuth, self._camera.elevation = azimuth, elevation
+
+    def __enter__(self) -> SceneRenderer:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._renderer.close()
+
+    def render(self, curves: Iterable[tuple[Array, Color]], *, goal: bool = True) -> Image:
+        """Render the scene with ropes or bands in it, the grippers at their ends.
+
+        Parameters
+        ----------
+        curves : iterable of (ndarray of shape (n, 3), color)
+            Centre lines, drawn as thick as the rope.
+        goal : bool
+            Whether to show where the grippers should end.
+
+        Returns
+        -------
+        image : ndarray of uint8 of shape (height, width, 3)
+        """
+        self._renderer.update_scene(self._data, self._camera)
+        for points, color in curves:
+            for start, end in itertools.pairwise(points):
+                self._add_link(start, end, color)
+            self._add_spheres((points[0], points[-1]), _GRIPPER_COLOR)
+        if goal:
+            self._add_spheres(self._scene.goal, _GOAL_COLOR, 1.5 * GRIPPER_RADIUS)
+        image: Image = self._renderer.render()
+        return image
+
+    def _add_link(self, start: Array, end: Array, color: Color) -> None:
+        import mujoco
+
+        geom = self._new_geom(mujoco.mjtGeom.mjGEOM_CAPSULE, (1.0, 1.0, 1.0), start, color)
+        mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_CAPSULE, ROPE_RADIUS, start, end)
+
+    def _add_spheres(
+        self, centers: Iterable[Array], color: Color, radius: float = GRIPPER_RADIUS
+    ) -> None:
+        import mujoco
+
+        for center in centers:
+            self._new_geom(mujoco.mjtGeom.mjGEOM_SPHERE, (radius,) * 3, center, color)
+
+    def _new_geom(self, shape: Any, size: Sequence[float], center: Array, color: Color) -> Any:
+        import mujoco
+
+        scene = self._renderer.scene
+        geom = scene.geoms[scene.ngeom]
+        mujoco.mjv_initGeom(
+            geom, shape, size, center, np.eye(3).ravel(), np.array(color, dtype=np.float32)
+        )
+        scene.ngeom += 1
+        return geom
+
+
+def _model_xml(scene: Scene, width: int, height: int) -> str:
+    geoms = "\n".join(_geom_xml(obstacle) for obstacle in scene.obstacles)
+    high = scene.bounds[1] + (0.0, 0.0, 2.0)
+    return f"""
+<mujoco>
+  <visual>
+    <global offwidth="{width}" offheight="{height}"/>
+    <headlight ambient="0.45 0.45 0.45" diffuse="0.45 0.45 0.45" specular="0 0 0"/>
+    <quality shadowsize="4096"/>
+    <map znear="0.02"/>
+  </visual>
+  <asset>
+    <texture type="skybox" builtin="flat" rgb1="1 1 1" rgb2="1 1 1" width="8" height="8"/>
+  </asset>
+  <worldbody>
+    <light pos="0 0 {high[2]}" dir="0.1 0.1 -1" diffuse="0.35 0.35 0.35"/>
+{geoms}
+  </worldbody>
+</mujoco>"""
+
+
+def _geom_xml(obstacle: Obstacle) -> str:
+    color = f'rgba="{_numbers(_obstacle_color(obstacle))}"'
+    if isinstance(obstacle, Box):
+        place = f'pos="{_numbers(obstacle.center)}" size="{_numbers(obstacle.half_extents)}"'
+        return f'<geom type="box" {place} {color}/>'
+    if isinstance(obstacle, Capsule):
+        ends = _numbers((*obstacle.start, *obstacle.end))
+        return f'<geom type="capsule" fromto="{ends}" size="{obstacle.radius}" {color}/>'
+    ends = _numbers((*_cylinder_end(obstacle, -1.0), *_cylinder_end(obstacle, 1.0)))
+    return f'<geom type="cylinder" fromto="{ends}" size="{obstacle.radius}" {color}/>'
+
+
+def _cylinder_end(cylinder: Cylinder, side: float) -> Array:
+    end = np.array(cylinder.center)
+    end[cylinder.axis] += side * cylinder.half_length
+    return end
+
+
+def _obstacle_color(obstacle: Obstacle) -> Color:
+    if "outer wall" in obstacle.name:
+        return _OUTER_WALL_COLOR
+    if "wall" in obstacle.name:
+        return _WALL_COLOR
+    return _FLOOR_COLOR if obstacle.name == "floor" else _HOOK_COLOR
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(f"{value:.9g}" for value in values)

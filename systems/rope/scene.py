@@ -1,0 +1,215 @@
+"""A rope held by two grippers, among obstacles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from systems.rope.obstacles.shapes import Array, Obstacle, pack_obstacles
+from systems.rope.obstacles.signed_distance import signed_distance
+from systems.validation import as_finite_array, check_within_bounds
+
+ROPE_RADIUS = 0.01
+NODE_SPACING = 0.02
+# A gripper is a sphere around the point where it holds the rope; planners keep more away.
+GRIPPER_RADIUS = 0.023
+GRIPPER_CLEARANCE = 0.03
+# The longest displacement of both grippers together in one transition.
+STEP_SIZE = 0.025
+MAX_STRETCH = 1.15
+
+_GRIPPERS = ("A", "B")
+_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A rope, the obstacles around it, where it starts and where the grippers should end.
+
+    Lengths are metres in the world frame, z up. At the start the rope hangs at rest between
+    the grippers: straight where they are ``rope_length`` apart, as a catenary otherwise.
+
+    Attributes
+    ----------
+    obstacles : sequence of Box, Cylinder or Capsule
+    bounds : array-like of shape (2, 3)
+        Lower and upper corner of the world, which the grippers do not leave.
+    rope_length : float
+        Length at rest, along the rope from one gripper to the other. The lengths that the
+        paper names (0.55, 0.87, 1.13 and 1.59 m) are ``max_stretch * rope_length``.
+    start, goal : array-like of shape (2, 3)
+        Positions of gripper A and gripper B.
+    max_stretch : float
+        λ: the rope may not become longer than ``max_stretch * rope_length``.
+    name : str
+
+    Raises
+    ------
+    ValueError
+        If the rope or a gripper starts in an obstacle, the start overstretches the rope, the
+        goal cannot be held, or a value is degenerate or not finite.
+
+    References
+    ----------
+    McConachie et al. 2020, "Rope Manipulation Experiments".
+    """
+
+    obstacles: Sequence[Obstacle]
+    bounds: Array
+    rope_length: float
+    start: Array
+    goal: Array
+    max_stretch: float = MAX_STRETCH
+    name: str = "scene"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "obstacles", tuple(self.obstacles))
+        for field in ("bounds", "start", "goal"):
+            object.__setattr__(self, field, _frozen_array(getattr(self, field), field))
+        _check_scalars(self)
+        if not (self.bounds[0] < self.bounds[1]).all():
+            raise ValueError(
+                "bounds must hold the lower corner and then the upper corner, got "
+                f"{self.bounds.tolist()}."
+            )
+        _check_start(self)
+        _check_goal(self)
+
+    @cached_property
+    def packed(self) -> Array:
+        """The obstacles as the table that distances are computed from, shape (n, 8)."""
+        return pack_obstacles(self.obstacles)
+
+    @property
+    def n_nodes(self) -> int:
+        """Points along the rope, about 2 cm apart, the first and last in the grippers."""
+        return max(3, round(self.rope_length / NODE_SPACING) + 1)
+
+    @property
+    def max_band_length(self) -> float:
+        """Length beyond which the rope is overstretched."""
+        return self.max_stretch * self.rope_length
+
+    def start_rope(self) -> Array:
+        """Return the rope's nodes at the start, shape (n_nodes, 3)."""
+        return hanging_rope(self.start, self.rope_length, self.n_nodes)
+
+
+def hanging_rope(grippers: ArrayLike, rope_length: float, n_nodes: int) -> Array:
+    """Lay a rope from gripper to gripper: a catenary, or straight where it is taut.
+
+    Parameters
+    ----------
+    grippers : array-like of shape (2, 3)
+    rope_length : float
+        Length at rest; a straight rope is stretched evenly where it is shorter.
+    n_nodes : int
+
+    Returns
+    -------
+    nodes : ndarray of shape (n_nodes, 3)
+        Evenly spaced along the rope, from gripper A to gripper B.
+    """
+    first, last = as_finite_array(grippers, "grippers", (2, 3))
+    fraction = np.linspace(0.0, 1.0, n_nodes)[:, None]
+    if np.linalg.norm(last - first) >= rope_length * (1.0 - 1e-6):
+        nodes = first + fraction * (last - first)
+        nodes[-1] = last
+        return nodes
+    across, height = _catenary(last - first, rope_length, fraction[:, 0] * rope_length)
+    nodes = first + across[:, None] * (last - first)
+    nodes[:, 2] = first[2] + height
+    nodes[-1] = last
+    return nodes
+
+
+def _catenary(span: Array, length: float, arc: Array) -> tuple[Array, Array]:
+    """Fraction of the way across, and height above the first end, at each arc length."""
+    rise = float(span[2])
+    # Ends straight above one another would leave the curve no width to be computed from.
+    width = max(float(np.hypot(span[0], span[1])), 1e-4 * length)
+    slack = np.sqrt(length**2 - rise**2) / width
+    if slack <= 1.0 + 1e-9:
+        return arc / length, arc / length * rise
+    low, high = 1e-6, 40.0
+    for _ in range(80):  # bisection for sinh(x) / x = slack
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if np.sinh(middle) < slack * middle else (low, middle)
+    scale = width / (2.0 * low)
+    left = np.arctanh(rise / length) - low
+    slope = np.sinh(left) + arc / scale
+    return (np.arcsinh(slope) - left) * scale / width, scale * (
+        np.hypot(1.0, slope) - np.cosh(left)
+    )
+
+
+def _frozen_array(values: ArrayLike, name: str) -> Array:
+    array = as_finite_array(values, name, (2, 3)).copy()
+    array.flags.writeable = False
+    return array
+
+
+def _check_scalars(scene: Scene) -> None:
+    if not (np.ndim(scene.rope_length) == 0 and 0.0 < scene.rope_length < np.inf):
+        raise ValueError(f"rope_length must be positive and finite, got {scene.rope_length!r}.")
+    if not (np.ndim(scene.max_stretch) == 0 and 1.0 <= scene.max_stretch < np.inf):
+        raise ValueError(f"max_stretch must be finite and at least 1, got {scene.max_stretch!r}.")
+
+
+def _check_start(scene: Scene) -> None:
+    check_within_bounds(scene.start, scene.bounds, "start")
+    apart = float(np.linalg.norm(scene.start[1] - scene.start[0]))
+    if apart > scene.rope_length + _TOLERANCE:
+        raise ValueError(
+            f"The rope is shorter than the distance between the grippers at the start: "
+            f"rope_length is {scene.rope_length:g} m, start puts them {apart:g} m apart "
+            f"(stretched by {apart / scene.rope_length:.3g}, allowed {scene.max_stretch:g}). "
+            "Give a longer rope_length or move the grippers together."
+        )
+    _check_clear(scene, scene.start, GRIPPER_RADIUS, "start")
+    n_samples = int(np.ceil(scene.rope_length / (0.5 * ROPE_RADIUS))) + 1
+    rope = hanging_rope(scene.start, scene.rope_length, n_samples)
+    distances = signed_distance(rope, scene.packed)
+    worst = int(distances.argmin())
+    if distances[worst] < ROPE_RADIUS - 1e-6:
+        raise ValueError(
+            f"The rope starts in collision with {_nearest_name(scene, rope[worst])!r}: hanging "
+            f"between the grippers it passes {rope[worst].round(4).tolist()}, "
+            f"{distances[worst]:.3g} m from it, and its radius is {ROPE_RADIUS} m. Move the "
+            "grippers of start or that obstacle."
+        )
+
+
+def _check_goal(scene: Scene) -> None:
+    margin = np.array([[GRIPPER_CLEARANCE], [-GRIPPER_CLEARANCE]])
+    check_within_bounds(scene.goal, scene.bounds + margin, "goal")
+    _check_clear(scene, scene.goal, GRIPPER_CLEARANCE, "goal")
+    apart = float(np.linalg.norm(scene.goal[1] - scene.goal[0]))
+    if not GRIPPER_CLEARANCE <= apart <= scene.max_band_length:
+        raise ValueError(
+            f"goal puts the grippers {apart:g} m apart; give a goal between "
+            f"{GRIPPER_CLEARANCE} m and {scene.max_band_length:g} m, the rope's length times "
+            "max_stretch."
+        )
+
+
+def _check_clear(scene: Scene, grippers: Array, clearance: float, name: str) -> None:
+    for letter, position in zip(_GRIPPERS, grippers, strict=True):
+        distance = float(signed_distance(position, scene.packed))
+        if distance < clearance:
+            raise ValueError(
+                f"{name} puts gripper {letter} in collision with "
+                f"{_nearest_name(scene, position)!r}: {position.tolist()} is {distance:.3g} m "
+                f"from it, {clearance} m are needed. Move the gripper or that obstacle."
+            )
+
+
+def _nearest_name(scene: Scene, point: Array) -> str:
+    distances = [
+        float(signed_distance(point, pack_obstacles([obstacle]))) for obstacle in scene.obstacles
+    ]
+    return scene.obstacles[int(np.argmin(distances))].name

@@ -1,0 +1,1 @@
+"""The true execution of the rope in a physics engine."""

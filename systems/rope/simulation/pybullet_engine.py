@@ -1,0 +1,238 @@
+"""The rope in PyBullet, the paper's engine: capsules joined end to end in maximal coordinates."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Sequence
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from systems.rope.obstacles.shapes import Array, Box, Cylinder, Obstacle
+from systems.rope.scene import ROPE_RADIUS
+from systems.rope.simulation.state import RopeState
+
+SCALE = 10.0  # engine lengths per metre: its contact margins are made for bodies of that size
+TIME_STEP = 0.01
+GRAVITY = 9.8  # engine lengths, hence 0.98 m/s²
+SOLVER_ITERATIONS = 20
+LINK_MASS = 0.1
+LINEAR_DAMPING = 0.75
+ANGULAR_DAMPING = 0.9
+FRICTION = 1.0
+ROPE_GROUP, OBSTACLE_GROUP = 64, 2  # static bodies are in group 2, and never meet one another
+SIMULATION_WIDTH = 10
+
+
+class PybulletRope:
+    """A rope of ``n_nodes`` capsules, whose centres are ``spacing`` metres apart at rest.
+
+    Neighbours are joined, and the grippers hold the centres of both end capsules, by
+    point-to-point constraints, which give way when the rope is stretched. Every state is loaded
+    into a new simulator, so that the same states and moves always give the same result. Going on
+    from a saved state differs from never having stopped by less than a millimetre: the engine
+    does not show what it knows of its contacts.
+
+    Parameters
+    ----------
+    obstacles : sequence of Box, Cylinder or Capsule
+    n_nodes : int
+    spacing : float
+        Metres.
+    """
+
+    def __init__(self, obstacles: Sequence[Obstacle], n_nodes: int, spacing: float) -> None:
+        self._bullet = _import_pybullet()
+        self._obstacles = tuple(obstacles)
+        self._n_nodes = n_nodes
+        self._spacing = spacing * SCALE
+        self._disconnect: Any = lambda: None
+
+    def load(self, state: RopeState) -> None:
+        """Take over a state; one without ``simulation`` starts at rest."""
+        if state.simulation is not None and state.simulation.shape != (
+            self._n_nodes,
+            SIMULATION_WIDTH,
+        ):
+            raise ValueError(
+                "state must come from a rope of this length with the engine 'pybullet', got a "
+                f"simulation of shape {state.simulation.shape}; pass simulation=None to start "
+                "from its nodes at rest."
+            )
+        self._start_simulator()
+        for obstacle in self._obstacles:
+            self._add_obstacle(obstacle)
+        self._add_rope(state)
+        self._add_grippers(state.grippers)
+
+    def save(self) -> RopeState:
+        """Return the present state."""
+        bullet, client = self._bullet, self._client
+        poses = [bullet.getBasePositionAndOrientation(link, client) for link in self._links]
+        speeds = [bullet.getBaseVelocity(link, client) for link in self._links]
+        nodes = np.array([position for position, _ in poses]) / SCALE
+        simulation = np.array(
+            [
+                (*turn, *linear, *angular)
+                for (_, turn), (linear, angular) in zip(poses, speeds, strict=True)
+            ]
+        )
+        return RopeState(self._held.copy(), nodes, simulation)
+
+    def move_grippers(self, grippers: Array) -> None:
+        """Put the grippers, of shape (2, 3), where they are to be."""
+        for body, position in zip(self._grippers, (grippers * SCALE).tolist(), strict=True):
+            self._bullet.resetBasePositionAndOrientation(body, position, UPRIGHT, self._client)
+        self._held[:] = grippers
+
+    def step(self, n_steps: int) -> None:
+        """Advance by some time steps."""
+        for _ in range(n_steps):
+            self._bullet.stepSimulation(self._client)
+
+    def _start_simulator(self) -> None:
+        bullet = self._bullet
+        self._disconnect()
+        self._client = bullet.connect(bullet.DIRECT)
+        self._disconnect = weakref.finalize(self, bullet.disconnect, self._client)
+        bullet.setGravity(0.0, 0.0, -GRAVITY, self._client)
+        bullet.setPhysicsEngineParameter(
+            fixedTimeStep=TIME_STEP,
+            numSolverIterations=SOLVER_ITERATIONS,
+            deterministicOverlappingPairs=1,
+            physicsClientId=self._client,
+        )
+        # Nobody looks, but without a simple shape to draw it meshes every body: four times slower.
+        self._drawn = bullet.createVisualShape(
+            bullet.GEOM_BOX, halfExtents=[ROPE_RADIUS] * 3, physicsClientId=self._client
+        )
+
+    def _add_obstacle(self, obstacle: Obstacle) -> None:
+        bullet, client = self._bullet, self._client
+        if isinstance(obstacle, Box):
+            center, turn = np.array(obstacle.center), UPRIGHT
+            half_extents = [SCALE * extent for extent in obstacle.half_extents]
+            shape = bullet.createCollisionShape(
+                bullet.GEOM_BOX, halfExtents=half_extents, physicsClientId=client
+            )
+        else:
+            center, axis, length, kind = _round_shape(bullet, obstacle)
+            turn = _turns_from_z(axis[None])[0].tolist()
+            shape = bullet.createCollisionShape(
+                kind, radius=SCALE * obstacle.radius, height=SCALE * length, physicsClientId=client
+            )
+        body = bullet.createMultiBody(
+            0.0, shape, self._drawn, (SCALE * center).tolist(), turn, physicsClientId=client
+        )
+        bullet.changeDynamics(body, -1, lateralFriction=FRICTION, physicsClientId=client)
+
+    def _add_rope(self, state: RopeState) -> None:
+        bullet, client = self._bullet, self._client
+        shape = bullet.createCollisionShape(
+            bullet.GEOM_CAPSULE,
+            radius=SCALE * ROPE_RADIUS,
+            height=self._spacing,
+            physicsClientId=client,
+        )
+        rows = _at_rest(state.nodes) if state.simulation is None else state.simulation
+        places = (SCALE * state.nodes).tolist()
+        self._links = [
+            self._add_link(shape, place, row.tolist())
+            for place, row in zip(places, rows, strict=True)
+        ]
+        tip, tail = [0.0, 0.0, self._spacing / 2], [0.0, 0.0, -self._spacing / 2]
+        for link, following in zip(self._links[:-1], self._links[1:], strict=True):
+            self._join(link, following, tip, tail)
+
+    def _add_link(self, shape: int, place: list[float], row: list[float]) -> int:
+        bullet, client = self._bullet, self._client
+        link: int = bullet.createMultiBody(
+            LINK_MASS,
+            shape,
+            self._drawn,
+            place,
+            row[:4],
+            useMaximalCoordinates=1,
+            physicsClientId=client,
+        )
+        bullet.changeDynamics(
+            link,
+            -1,
+            lateralFriction=FRICTION,
+            linearDamping=LINEAR_DAMPING,
+            angularDamping=ANGULAR_DAMPING,
+            physicsClientId=client,
+        )
+        bullet.setCollisionFilterGroupMask(link, -1, ROPE_GROUP, OBSTACLE_GROUP, client)
+        bullet.resetBaseVelocity(link, row[4:7], row[7:], client)
+        return link
+
+    def _add_grippers(self, grippers: Array) -> None:
+        self._held = grippers.copy()
+        self._grippers = []
+        for place, link in zip(grippers, (self._links[0], self._links[-1]), strict=True):
+            gripper = self._bullet.createMultiBody(
+                0.0,
+                -1,
+                self._drawn,
+                (SCALE * place).tolist(),
+                useMaximalCoordinates=1,
+                physicsClientId=self._client,
+            )
+            self._join(gripper, link, ORIGIN, ORIGIN)
+            self._grippers.append(gripper)
+
+    def _join(self, one: int, other: int, on_one: list[float], on_other: list[float]) -> None:
+        bullet = self._bullet
+        bullet.createConstraint(
+            one,
+            -1,
+            other,
+            -1,
+            bullet.JOINT_POINT2POINT,
+            ORIGIN,
+            on_one,
+            on_other,
+            physicsClientId=self._client,
+        )
+
+
+UPRIGHT = [0.0, 0.0, 0.0, 1.0]
+ORIGIN = [0.0, 0.0, 0.0]
+
+
+def _import_pybullet() -> ModuleType:
+    try:
+        import pybullet
+    except ImportError as error:
+        raise ImportError(
+            "The engine 'pybullet' needs PyBullet: install transition-reliability[pybullet], or "
+            "use the engine 'mujoco'."
+        ) from error
+    return pybullet
+
+
+def _round_shape(bullet: ModuleType, obstacle: Any) -> tuple[Array, Array, float, int]:
+    if isinstance(obstacle, Cylinder):
+        axis = np.eye(3)[obstacle.axis]
+        return np.array(obstacle.center), axis, 2 * obstacle.half_length, bullet.GEOM_CYLINDER
+    start, end = np.array(obstacle.start), np.array(obstacle.end)
+    length = float(np.linalg.norm(end - start))
+    return (start + end) / 2, (end - start) / length, length, bullet.GEOM_CAPSULE
+
+
+def _at_rest(nodes: Array) -> Array:
+    rows = np.zeros((len(nodes), SIMULATION_WIDTH))
+    along = np.gradient(nodes, axis=0)
+    lengths = np.linalg.norm(along, axis=1, keepdims=True)
+    rows[:, :4] = _turns_from_z(along / np.maximum(lengths, 1e-12))
+    return rows
+
+
+def _turns_from_z(directions: Array) -> Array:
+    # The shortest turn from z to d is the quaternion (z × d, 1 + z·d), normalised.
+    x, y, z = directions.T
+    turns = np.column_stack([-y, x, np.zeros_like(x), 1.0 + z])
+    turns[z < -1.0 + 1e-9] = (1.0, 0.0, 0.0, 0.0)
+    return turns / np.linalg.norm(turns, axis=1, keepdims=True)

@@ -1,0 +1,1 @@
+"""Where the slack of the rope is, by position-based dynamics."""

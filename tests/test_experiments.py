@@ -1,0 +1,64 @@
+"""The examples run, at small size, as a user would run them."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+
+def run(*command, cwd):
+    return subprocess.run(
+        [sys.executable, *map(str, command)],
+        cwd=cwd,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=1200,
+        check=True,
+    ).stdout
+
+
+def test_arm_example_gives_its_table_and_pictures(tmp_path):
+    script = "-m", "benchmarks.arm"
+    options = ("--plans", 60, "--queries", 4, "--jobs", 2, "--out", tmp_path / "out")
+    shown = run(*script, *options, cwd=tmp_path)
+    assert "Held-out accuracy" in shown
+    assert "From hanging to standing" in shown
+    assert "Starts at which the arm can rest: successes out of 4" in shown
+    results = json.loads((tmp_path / "out" / "results.json").read_text())
+    planners = results["Starts at which the arm can rest"]
+    assert list(planners) == ["none", "none, holdable goals", "literal", "ours"]
+    assert all(len(records) == 4 for records in planners.values())
+    for name in ("arm.joblib", "motions.png", "success.png"):
+        assert (tmp_path / "out" / name).stat().st_size > 10_000
+    again = run(*script, *options, cwd=tmp_path)
+    tables = [text[text.index("Held-out") : text.index("Starts at")] for text in (shown, again)]
+    assert tables[0] == tables[1], "the same seeds, the same models"
+
+
+def test_car_example_gives_its_tables_and_pictures(tmp_path):
+    out = tmp_path / "out"
+    size = ("--scenes", 3, "--plans", 5, "--rounds", 2, "--test-scenes", 1, "--queries", 1)
+    shown = run("-m", "benchmarks.car", *size, "--jobs", 1, "--out", out, cwd=tmp_path)
+    assert "Round 1:" in shown
+    assert "Best accuracy that any classifier of b, u and E can have here" in shown
+    assert "Random scenes: success is within 0.3" in shown
+    results = json.loads((out / "results.json").read_text())
+    for planners in results.values():
+        assert list(planners) == ["none", "classifier", "waypoints moved", "ours", "ceiling"]
+    assert [len(rows) for rows in results["Random scenes"].values()] == [1] * 5
+    for name in ("fan.png", "speeds.png", "trees.png", "executions.gif", "calibration.png"):
+        assert 5_000 < (out / name).stat().st_size < 300_000
+
+
+def test_rope_example_shows_a_rope_that_got_caught_and_one_that_did_not(tmp_path):
+    options = ("simple_hook_short", "--size", 160, 120, "--plans", 8, "--out", tmp_path)
+    shown = run("-m", "benchmarks.rope", *options, cwd=tmp_path)
+    assert "without a classifier: planned in" in shown
+    assert "stopped there" in shown
+    assert "Every command was carried out" in shown
+    pictures = {file.name for file in (tmp_path / "simple_hook_short").iterdir()}
+    assert pictures == {"caught.png", "worked.png", "caught_and_worked.gif"}
