@@ -129,7 +129,7 @@ class RepropagatedShortcuts:
     def _with_shortcut(
         self, path: Path, doubted: Array, first: int, last: int, way: Array
     ) -> tuple[Path, Array] | None:
-        """Return the plan with one shortcut, and its negative_log_likelihood, or None where that may not be."""
+        """Return the plan with one shortcut and its transitions' costs, or None if not allowed."""
         shortcut = self._go(path.reduced[first], way)
         if shortcut is None:
             return None

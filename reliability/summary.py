@@ -71,7 +71,8 @@ class Summary:
         """Tell the numbers in a few lines."""
         low, middle, high = np.quantile(self.transitions_per_plan, (0.1, 0.5, 0.9))
         of_those = (
-            f"; {self.divergence_onset_share:.1%} of those are divergence onsets, the others follow one"
+            f"; {self.divergence_onset_share:.1%} of those are divergence onsets, the others follow"
+            " one"
             if self.unreliable_share
             else ""
         )

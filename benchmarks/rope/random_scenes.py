@@ -1,9 +1,9 @@
 """Plans in random scenes that nothing was learned from, with each of Table I's columns.
 
 Run as ``python -m benchmarks.rope.random_scenes --jobs 2``. Of the random scenes drawn from
-``--first`` on, those count in which a slot parts the grippers, a slit has to be passed, and the first plan without a
-classifier goes wrong. Their seed is not that of the random scenes that the models learned from. A random scene
-takes about a minute; a line is printed for each, and the sums at the end.
+``--first`` on, those count in which a slot parts the grippers, a slit has to be passed, and the
+first plan without a classifier goes wrong. Their seed is not that of the scenes that the models
+learned from. A scene takes about a minute; a line is printed for each, and the sums at the end.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from collections import Counter
 
 import joblib
 import numpy as np
+
 from benchmarks.rope.table1 import COLUMNS, UNCLASSIFIED
 from benchmarks.rope.table1_trials import MAX_ITERATIONS, TOLERANCE, model_at
-
 from planners import BiasedRRT
 from systems import Rope, Scene, SimulationDivergedError, random_rope_scene
 from systems.rope.random_scenes import has_slot_and_slit
@@ -38,7 +38,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     options = parser.parse_args(arguments)
     found = joblib.Parallel(n_jobs=options.jobs)(
-        joblib.delayed(plan_in_random scene)(i, options.columns, options.time_limit)
+        joblib.delayed(plan_in_random_scene)(i, options.columns, options.time_limit)
         for i in range(options.first, options.first + options.scenes)
     )
     scenes = [outcomes for outcomes in found if outcomes]
@@ -48,7 +48,7 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"{name:8}" + ", ".join(f"{counts[outcome]} {outcome}" for outcome in OUTCOMES))
 
 
-def plan_in_random scene(i: int, columns: list[str], time_limit: float) -> dict[str, str]:
+def plan_in_random_scene(i: int, columns: list[str], time_limit: float) -> dict[str, str]:
     """Return what becomes of each column's plan; nothing if the random scene does not count."""
     scene = random_rope_scene(np.random.SeedSequence([SEED, i]))
     if not has_slot_and_slit(scene):

@@ -1,8 +1,8 @@
 """The rope's rates on one core: g, Close, RRT extensions, Γ and the engine's share, classifiers.
 
 Run as ``python -m benchmarks.speed.rope``; it takes about three minutes. Rates depend on the
-machine, so each is also given as a multiple of another one of the same run: Γ's, the network's alone, or
-that of planning without a classifier. Seconds are of this process alone.
+machine, so each is also given as a multiple of another one of the same run: Γ's, the network's
+alone, or that of planning without a classifier. Seconds are of this process alone.
 """
 
 from __future__ import annotations

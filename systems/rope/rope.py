@@ -37,11 +37,11 @@ _MOST_DRAWS = 1000
 class Rope(System):
     """A rope held by two grippers; its reduced state is the rope pulled taut.
 
-    True states are :class:`systems.rope.simulation.state.RopeState`. A reduced state is the positions of
-    grippers A and B, which are its configuration, and then the points of the elastic band from A
-    to B (see :mod:`systems.rope.band.band`); with ``features="clearance"`` guesses at the rope itself follow
-    (see :mod:`systems.rope.slack.pbd_ropes`). Commands are displacements of A and B, together no more than
-    ``step_size``. All are metres in the world frame, z up.
+    True states are :class:`systems.rope.simulation.state.RopeState`. A reduced state is the
+    positions of grippers A and B, which are its configuration, and then the points of the
+    elastic band from A to B (see :mod:`systems.rope.band.band`); with ``features="clearance"`` guesses at the rope
+    itself follow (see :mod:`systems.rope.slack.pbd_ropes`). Commands are displacements of A and B,
+    together no more than ``step_size``. All are metres in the world frame, z up.
 
     Parameters
     ----------
@@ -188,8 +188,9 @@ class Rope(System):
         -------
         X : ndarray of shape (n, n_features)
             With "voxels", uint8 of 12288 features: see
-            :func:`systems.rope.features.voxels.voxel_features`. With "clearance", float32 of 496: see
-            :func:`systems.rope.features.clearance.clearance_features`. With "vector", float64 of 13: see
+            :func:`systems.rope.features.voxels.voxel_features`. With "clearance", float32 of 496:
+            see :func:`systems.rope.features.clearance.clearance_features`. With "vector", float64
+            of 13: see
             :func:`systems.rope.features.registry.vector_features`.
         """
         return FEATURES[self.feature_kind](reduced, next_reduced, self.scene)

@@ -31,13 +31,13 @@ def clearance_features(reduced: Array, next_reduced: Array, scene: Scene) -> Arr
     """Describe transitions by the obstacles between the band and the rope that hangs below it.
 
     The band forgets how the rope hangs, and yet the length of the rope implies it: below the
-    band, as deep as the slack lets it. What catches the rope goes through this curtain. Before
+    band, as deep as the slack lets it. What catches the rope goes through this region. Before
     and after the transition come the distance between the grippers, the length of the band, the
     rise from gripper A to B and the depth of the rope, as shares of the rope's length; then,
     after it, the signed distance to the obstacles on a grid of 16 columns along the band by 8
     rows from the band down to a little below the rope, clipped to -0.05 and 0.15 m, in units of
-    0.05 m. A rope that rests on an edge drags behind its grippers, so then come, for each loose
-    rope (see :mod:`systems.rope.slack.pbd_ropes`), such a grid from the band towards it and a little beyond;
+    0.05 m. A rope that rests on an edge drags behind its grippers, so then come, for each PBD
+    rope (see :mod:`systems.rope.slack.pbd_ropes`), such a grid from the band towards it and beyond;
     the way from band to PBD rope in its 16 columns, in the same units, along the horizontal
     direction from A to B, to the left of it, and up; and its length as a share of the longest that
     is allowed. Last comes the motion of the grippers in steps of 0.025 m: along, to the left, and

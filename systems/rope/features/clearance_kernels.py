@@ -155,7 +155,7 @@ def fill_hanging_clearances(
 def fill_slack_clearances(
     bands: Any, ropes: Any, n_nodes: int, packed: Any, sheets: Any, offsets: Any, lengths: Any
 ) -> None:
-    """Write what :func:`fill_slack_clearance` does of each row's ropes, and the lengths of the ropes."""
+    """Write what :func:`fill_slack_clearance` does of each row's ropes, and their lengths."""
     nodes, tops = np.empty((n_nodes, 3)), np.empty((N_COLUMNS, 3))
     for i in range(bands.shape[0]):
         nodes[0], nodes[-1] = bands[i, :3], bands[i, 3:6]

@@ -3,8 +3,8 @@
 The band forgets where the slack is; a PBD rope remembers. Its nodes fall, its links go slack
 but do not stretch, and where it rests it rubs: position-based dynamics. Two, one of which rubs
 more while the other is thicker, take a tenth to a seventh of what MuJoCo takes
-(``benchmarks.speed.rope_engines``). They err by a centimetre or two, and now and then about what the
-rope gets caught on, though rarely both at once. A plan may overstretch neither, as it may not
+(``benchmarks.speed.rope_engines``). They err by a centimetre or two, and now and then about what
+the rope gets caught on, though rarely both at once. A plan may overstretch neither, as it may not
 overstretch the band; all else that they say is a feature to learn from.
 
 They are a row of ``pbd_dim(scene)`` numbers. For each rope these are the nodes between the
