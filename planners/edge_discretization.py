@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from systems.angles import wrap_angle
+from systems.compilation import compiled
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ def split_edges(
     return _split_turning(starts, ends, step_size, angular)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _split_straight(
     starts: Array, ends: Array, step_size: float
 ) -> tuple[Array, Array, NDArray[np.int64]]:
@@ -66,7 +66,7 @@ def _split_straight(
     return origins, targets, edge
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _split_turning(
     starts: Array, ends: Array, step_size: float, angular: tuple[int, ...]
 ) -> tuple[Array, Array, NDArray[np.int64]]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from systems.compilation import compiled
 
 Array = NDArray[np.float64]
 
@@ -86,7 +87,7 @@ def _with_room(rows: NDArray[Any], capacity: int) -> NDArray[Any]:
     return roomy
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def nearest_rows(rows: Array, n_rows: int, dim: int, queries: Array) -> NDArray[np.int64]:
     """Return, for each query, the first row at the smallest Euclidean distance.
 
@@ -114,7 +115,7 @@ def nearest_rows(rows: Array, n_rows: int, dim: int, queries: Array) -> NDArray[
     return nearest
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def nearest_wrapped_rows(
     rows: Array, n_rows: int, wraps: NDArray[np.bool_], queries: Array
 ) -> NDArray[np.int64]:

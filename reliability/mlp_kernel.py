@@ -7,14 +7,15 @@ is many times the arithmetic.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from systems.compilation import compiled
 
 # A block of rows shares each slice of the weights while it is in the fastest cache.
 ROWS_PER_BLOCK = 8
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz"}, nogil=True)
+@compiled(fastmath={"contract", "reassoc", "nsz"})
 def mlp_logits(
     rows: NDArray[np.float32],
     sizes: NDArray[np.int64],

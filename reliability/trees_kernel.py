@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from systems.compilation import compiled
 
 LEAF = -1
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def boosted_sums(
     rows: NDArray[np.float64],
     baseline: float,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from systems.compilation import compiled
 
-@njit(cache=True, nogil=True)
+
+@compiled
 def fill_grids(
     rows: NDArray[np.uint8], channels: int, pooling: int, grids: NDArray[np.float32]
 ) -> None:

@@ -11,7 +11,7 @@ from systems.system import Problem, Rollout, StopReason, System
 if TYPE_CHECKING:
     from systems.car.car import Car
     from systems.car.scenes import CarScene, Circle, ConvexPolygon, random_car_scene
-    from systems.check_system import check_system
+    from systems.contract_checks import check_system
     from systems.planar_arm.planar_arm import PlanarArm
     from systems.rope.obstacles.shapes import Box, Capsule, Cylinder
     from systems.rope.paper_scenes import load_scene
@@ -53,7 +53,7 @@ _HOMES = {
     "PlanarArm": "systems.planar_arm.planar_arm",
     "Rope": "systems.rope.rope",
     "Scene": "systems.rope.scene",
-    "check_system": "systems.check_system",
+    "check_system": "systems.contract_checks",
     "load_scene": "systems.rope.paper_scenes",
     "random_car_scene": "systems.car.scenes",
     "random_rope_scene": "systems.rope.random_scenes",

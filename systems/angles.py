@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from systems.compilation import compiled
 
 Array = NDArray[np.float64]
 TURN = 2 * np.pi
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def wrap_angle(angle: float) -> float:
     """Return the same angle in [-π, π), itself if it is there already."""
     if -np.pi <= angle < np.pi:
@@ -35,7 +36,7 @@ def wrap_columns(rows: Array, angular: tuple[int, ...]) -> Array:
     return wrapped
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _wrap_in_place(rows: Array, angular: tuple[int, ...]) -> None:
     for row in range(rows.shape[0]):
         for i in angular:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from systems.angles import wrap_angle
 from systems.car.geometry import CONTACT, WHEELBASE, clearance
+from systems.compilation import compiled
 
 Array = NDArray[np.float64]
 
@@ -27,19 +27,19 @@ LARGEST_APPROACH = 1.2
 BISECTIONS = 30
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _clip(value: float, limit: float) -> float:
     return max(-limit, min(limit, value))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def curvature_limit(speed: float) -> float:
     """Return the tightest curvature at a speed, limited by steering and by grip."""
     tightest = np.tan(MAX_STEERING) / WHEELBASE
     return min(tightest, MAX_LATERAL_ACCELERATION / max(speed * speed, 1e-6))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def drive_step(
     state: Array, wanted_speed: float, wanted_curvature: float, duration: float, result: Array
 ) -> None:
@@ -70,7 +70,7 @@ def drive_step(
     result[4] = state[4] + turned
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _direction(start: Array, command: Array) -> float:
     """Return 1 where the car drives forwards to its target, -1 for backwards, 0 to stand still."""
     if command[0] ** 2 + command[1] ** 2 < STANDSTILL**2:
@@ -79,7 +79,7 @@ def _direction(start: Array, command: Array) -> float:
     return 1.0 if command[0] * np.cos(middle) + command[1] * np.sin(middle) >= 0 else -1.0
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _controls(state: Array, target: Array, direction: float) -> tuple[float, float]:
     """Return the wanted speed and curvature.
 
@@ -104,7 +104,7 @@ def _controls(state: Array, target: Array, direction: float) -> tuple[float, flo
     return direction * speed, direction * curvature
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _stop_at_contact(
     state: Array,
     speed: float,
@@ -127,7 +127,7 @@ def _stop_at_contact(
     drive_step(state, speed, curvature, low, result)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def execute_command(
     start: Array,
     command: Array,
@@ -195,7 +195,7 @@ def execute_command(
     return True, n_traced
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def execute_commands(
     start: Array, commands: Array, hulls: Array, corners: Array, walls: Array, states: Array
 ) -> int:
@@ -224,7 +224,7 @@ def execute_commands(
     return commands.shape[0]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def execute_rows(
     starts: Array, commands: Array, hulls: Array, corners: Array, walls: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
@@ -239,7 +239,7 @@ def execute_rows(
     return ends, completed
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def trace_commands(
     start: Array, commands: Array, hulls: Array, corners: Array, walls: Array, trace: Array
 ) -> int:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from systems.angles import wrap_angle
 from systems.car.geometry import clearance, scene_distance
+from systems.compilation import compiled
 
 Array = NDArray[np.float64]
 
@@ -21,12 +21,12 @@ SHORTEST = 1e-9
 N_FEATURES = 6 + len(ALONG_ARC) + len(AHEAD) * len(ASIDE)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _clip(value: float, limit: float) -> float:
     return max(-limit, min(limit, value))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def sine_of_slip(ahead: float, left: float, turn: float) -> float:
     """Return the sine of the angle between a displacement and the chord of an arc that turns so.
 
@@ -38,7 +38,7 @@ def sine_of_slip(ahead: float, left: float, turn: float) -> float:
     return (left * np.cos(0.5 * turn) - ahead * np.sin(0.5 * turn)) / length
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _clearances_along_arc(
     pose: Array,
     chord: float,
@@ -71,7 +71,7 @@ def _clearances_along_arc(
         result[k] = _clip(room, NEAR) / NEAR
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def transition_features(
     poses: Array, following: Array, hulls: Array, corners: Array, walls: Array
 ) -> Array:

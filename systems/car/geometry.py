@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from systems.angles import wrap_angle
+from systems.compilation import compiled
 
 Array = NDArray[np.float64]
 
@@ -17,7 +17,7 @@ CAR_RADIUS = 0.15
 CONTACT = 1e-3
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def point_segment_squared(
     px: float, py: float, ax: float, ay: float, bx: float, by: float
 ) -> float:
@@ -31,7 +31,7 @@ def point_segment_squared(
     return gap_x * gap_x + gap_y * gap_y
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _crossing(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
 ) -> bool:
@@ -42,7 +42,7 @@ def _crossing(
     return one * two < 0 and three * four < 0
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def polygon_distance(
     ax: float, ay: float, bx: float, by: float, corners: Array, n_corners: int
 ) -> float:
@@ -80,7 +80,7 @@ def polygon_distance(
     return np.sqrt(squared)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def scene_distance(
     ax: float, ay: float, bx: float, by: float, hulls: Array, corners: Array, walls: Array
 ) -> float:
@@ -99,7 +99,7 @@ def scene_distance(
     return nearest
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def clearance(
     x: float, y: float, heading: float, hulls: Array, corners: Array, walls: Array
 ) -> float:
@@ -108,7 +108,7 @@ def clearance(
     return scene_distance(x, y, front_x, front_y, hulls, corners, walls) - CAR_RADIUS
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def clearances(poses: Array, hulls: Array, corners: Array, walls: Array) -> Array:
     """Return the clearance of each pose, (n, 3)."""
     distances = np.empty(poses.shape[0])
@@ -118,7 +118,7 @@ def clearances(poses: Array, hulls: Array, corners: Array, walls: Array) -> Arra
     return distances
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def limited_ways(poses: Array, targets: Array, step_size: float) -> Array:
     """Return the displacements towards poses, the short way round and of at most one step.
 
@@ -137,7 +137,7 @@ def limited_ways(poses: Array, targets: Array, step_size: float) -> Array:
     return ways
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def straight_moves(
     poses: Array, moves: Array, hulls: Array, corners: Array, walls: Array
 ) -> tuple[Array, NDArray[np.bool_]]:

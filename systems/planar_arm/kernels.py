@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from systems.compilation import compiled
 
 Array = NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def limited_targets(current: Array, target: Array, step_size: float) -> Array:
     """Move each row of ``current`` towards ``target`` by at most ``step_size``.
 
@@ -36,7 +37,7 @@ def limited_targets(current: Array, target: Array, step_size: float) -> Array:
     return limited
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def transition_features(current: Array, following: Array, step_size: float) -> Array:
     """Describe transitions by configuration, link directions and direction of motion.
 

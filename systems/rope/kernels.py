@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from systems.compilation import compiled
 from systems.rope.band.propagation_kernels import propagate_row
 from systems.rope.obstacles.signed_distance_kernels import distance
 
 _ROUNDING = 1e-9
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def steer_rows(rows: Any, targets: Any, longest: float, out: Any) -> None:
     """Write the displacements of grippers towards targets, shortened to ``longest`` in R^6."""
     for i in range(rows.shape[0]):
@@ -27,7 +27,7 @@ def steer_rows(rows: Any, targets: Any, longest: float, out: Any) -> None:
                 out[i, k] *= scale
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def gripper_margin(q: Any, u: Any, bounds: Any, packed: Any) -> float:
     """Distance of grippers at q + u to one another, the bounds and obstacles: the least."""
     ax, ay, az = q[0] + u[0], q[1] + u[1], q[2] + u[2]
@@ -39,7 +39,7 @@ def gripper_margin(q: Any, u: Any, bounds: Any, packed: Any) -> float:
     return min(margin, distance(bx, by, bz, packed))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_margins(rows: Any, bounds: Any, packed: Any, margins: Any) -> None:
     """Write the margin of each row's grippers."""
     still = np.zeros(6)
@@ -47,7 +47,7 @@ def fill_margins(rows: Any, bounds: Any, packed: Any, margins: Any) -> None:
         margins[i] = gripper_margin(rows[i], still, bounds, packed)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def length_between(grippers: Any, nodes: Any) -> float:
     """Length from the first gripper along the nodes to the second."""
     total, x, y, z = 0.0, grippers[0, 0], grippers[0, 1], grippers[0, 2]
@@ -58,7 +58,7 @@ def length_between(grippers: Any, nodes: Any) -> float:
     return total
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def all_finite(rows: Any) -> bool:
     """Say whether rows hold no NaN and no infinity."""
     for i in range(rows.shape[0]):
@@ -68,7 +68,7 @@ def all_finite(rows: Any) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def propagate_rope_rows(
     rows: Any,
     commands: Any,

@@ -39,9 +39,10 @@ class Rope(System):
 
     True states are :class:`systems.rope.simulation.state.RopeState`. A reduced state is the
     positions of grippers A and B, which are its configuration, and then the points of the
-    elastic band from A to B (see :mod:`systems.rope.band.band`); with ``features="clearance"`` guesses at the rope
-    itself follow (see :mod:`systems.rope.slack.pbd_ropes`). Commands are displacements of A and B,
-    together no more than ``step_size``. All are metres in the world frame, z up.
+    elastic band from A to B (see :mod:`systems.rope.band.band`); with ``features="clearance"``
+    guesses at the rope itself follow (see :mod:`systems.rope.slack.pbd_ropes`). Commands are
+    displacements of A and B, together no more than ``step_size``. All are metres in the world
+    frame, z up.
 
     Parameters
     ----------

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from systems.compilation import compiled
 from systems.rope.band.propagation_kernels import n_points
 from systems.rope.obstacles.signed_distance_kernels import distance
 
@@ -14,7 +14,7 @@ from systems.rope.obstacles.signed_distance_kernels import distance
 CONTACT = 1e-4
 
 
-@njit(cache=True, nogil=True, inline="always")
+@compiled(inline="always")
 def segment_length(row: Any, i: int) -> float:
     """Length of the segment that starts at a band's i-th point."""
     k = 6 + 3 * i
@@ -22,7 +22,7 @@ def segment_length(row: Any, i: int) -> float:
     return np.sqrt(x * x + y * y + z * z)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def row_length(row: Any) -> float:
     """Length of the band in a row."""
     total = 0.0
@@ -31,7 +31,7 @@ def row_length(row: Any) -> float:
     return total
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def resample_row(row: Any, points: Any) -> None:
     """Write points that are evenly spaced along the band, ends included."""
     n, m = n_points(row), points.shape[0]
@@ -48,7 +48,7 @@ def resample_row(row: Any, points: Any) -> None:
             points[j, axis] = row[k + axis] + ratio * (row[k + 3 + axis] - row[k + axis])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def square_distance(points: Any, others: Any) -> float:
     """Sum of the squared distances of matched points."""
     total = 0.0
@@ -59,7 +59,7 @@ def square_distance(points: Any, others: Any) -> float:
     return total
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def segment_free(p: Any, q: Any, length: float, clearance: float, packed: Any) -> bool:
     """March along a segment in steps that the distance to the obstacles allows.
 
@@ -80,7 +80,7 @@ def segment_free(p: Any, q: Any, length: float, clearance: float, packed: Any) -
     return True
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def segments_free(points: Any, others: Any, packed: Any) -> bool:
     """Say whether every segment between matched points is free of obstacles."""
     clearance = -1.0
@@ -100,7 +100,7 @@ def segments_free(points: Any, others: Any, packed: Any) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def compare_rows(
     rows: Any, others: Any, packed: Any, max_square: float, workspace: Any, close: Any
 ) -> None:
@@ -112,14 +112,14 @@ def compare_rows(
         close[i] = near and segments_free(workspace[0], workspace[1], packed)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_lengths(rows: Any, lengths: Any) -> None:
     """Write the length of each row's band."""
     for i in range(rows.shape[0]):
         lengths[i] = row_length(rows[i])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_resampled(rows: Any, points: Any) -> None:
     """Write evenly spaced points of each row's band."""
     for i in range(rows.shape[0]):

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from systems.compilation import compiled
 from systems.rope.obstacles.signed_distance_kernels import (
     distance,
     distance_and_gradient,
@@ -37,27 +37,27 @@ _N_SLIDES = 2
 _SLIDE_FACTOR = 1.1  # more than 1 leads away from the obstacle, and is not blocked again
 
 
-@njit(cache=True, nogil=True, inline="always")
+@compiled(inline="always")
 def point_at(chain: Any, i: int) -> tuple[float, float, float, float]:
     """Read a point and its distance; chains have rows x, y, z, distance, changed."""
     return chain[i, 0], chain[i, 1], chain[i, 2], chain[i, 3]
 
 
-@njit(cache=True, nogil=True, inline="always")
+@compiled(inline="always")
 def put(chain: Any, i: int, point: Any, changed: float) -> None:
     """Write a point and its distance."""
     chain[i, 0], chain[i, 1], chain[i, 2] = point[0], point[1], point[2]
     chain[i, 3], chain[i, 4] = point[3], changed
 
 
-@njit(cache=True, nogil=True, inline="always")
+@compiled(inline="always")
 def apart(p: Any, q: Any) -> float:
     """Distance between two points."""
     x, y, z = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     return np.sqrt(x * x + y * y + z * z)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@compiled(inline="always")
 def between(p: Any, q: Any, ratio: float) -> tuple[float, float, float]:
     """Point on the way from one point to another."""
     return (
@@ -67,7 +67,7 @@ def between(p: Any, q: Any, ratio: float) -> tuple[float, float, float]:
     )
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def pushed_out(place: Any, clearance: float, packed: Any) -> tuple[float, float, float, float]:
     """Return a point with its distance, moved out of obstacles as far as asked."""
     x, y, z = place[0], place[1], place[2]
@@ -82,7 +82,7 @@ def pushed_out(place: Any, clearance: float, packed: Any) -> tuple[float, float,
     return x, y, z, d
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def blocked_at(p: Any, q: Any, way: Any, at_p: float, at_q: float, packed: Any) -> float:
     """Say how far along a segment its bubbles leave it uncovered; -1 if nowhere.
 
@@ -116,7 +116,7 @@ def blocked_at(p: Any, q: Any, way: Any, at_p: float, at_q: float, packed: Any) 
     return min(1.0, t / length)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def bent_blocked_at(before: Any, old: Any, new: Any, after: Any, packed: Any) -> float:
     """Say where the segments at a point that moved are blocked; -1 if nowhere.
 
@@ -130,7 +130,7 @@ def bent_blocked_at(before: Any, old: Any, new: Any, after: Any, packed: Any) ->
     return 1.0 + blocked if blocked >= 0.0 else -1.0
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def pull(before: Any, point: Any, after: Any, packed: Any) -> tuple[float, float, float]:
     """Return the way on which a point shortens the band most, along what it touches.
 
@@ -149,7 +149,7 @@ def pull(before: Any, point: Any, after: Any, packed: Any) -> tuple[float, float
     return x, y, z
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def removable(before: Any, point: Any, after: Any, packed: Any) -> bool:
     """Say whether the band may cut straight from one neighbour of a point to the other."""
     a, b = apart(before, point), apart(point, after)
@@ -162,7 +162,7 @@ def removable(before: Any, point: Any, after: Any, packed: Any) -> bool:
     return bent_blocked_at(before, point, middle, after, packed) < 0.0
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def bent_segment(p: Any, q: Any, ratio: float, packed: Any) -> tuple[float, float, float, float]:
     """Return a point of a segment, pushed out to the clearance; its distance is -1 if it cannot."""
     place = between(p, q, ratio)
@@ -172,7 +172,7 @@ def bent_segment(p: Any, q: Any, ratio: float, packed: Any) -> tuple[float, floa
     return place[0], place[1], place[2], -1.0
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def moved_by(point: Any, way: Any, scale: float, packed: Any) -> tuple[float, float, float, float]:
     """Return a point moved along a way, but not nearer to obstacles than it may be."""
     far = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
@@ -182,7 +182,7 @@ def moved_by(point: Any, way: Any, scale: float, packed: Any) -> tuple[float, fl
     return pushed_out(place, min(CLEARANCE, point[3]), packed)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def slide(
     before: Any, tried: Any, after: Any, way: Any, blocked: float, packed: Any
 ) -> tuple[float, float, float]:
@@ -196,7 +196,7 @@ def slide(
     return way[0] - inward * gx, way[1] - inward * gy, way[2] - inward * gz
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def bend_and_move(
     chain: Any, n: int, point: Any, new: Any, after: Any, blocked: float, packed: Any
 ) -> int:
@@ -220,7 +220,7 @@ def bend_and_move(
     return n + 2
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def try_way(
     chain: Any, n: int, point: Any, after: Any, way: Any, packed: Any
 ) -> tuple[int, float, Any]:
@@ -246,7 +246,7 @@ def try_way(
     return -1, blocked, tried
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def move(chain: Any, n: int, point: Any, after: Any, packed: Any) -> tuple[int, bool]:
     """Append a point, pulled taut; return the chain's new length and whether it moved."""
     before = point_at(chain, n - 1)
@@ -265,7 +265,7 @@ def move(chain: Any, n: int, point: Any, after: Any, packed: Any) -> tuple[int, 
     return n + 1, False
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def sweep(source: Any, n: int, chain: Any, packed: Any) -> tuple[int, bool]:
     """Contract the band once, from its last point to its first, which reverses it.
 
@@ -290,7 +290,7 @@ def sweep(source: Any, n: int, chain: Any, packed: Any) -> tuple[int, bool]:
     return m + 1, any_changed
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def contract(chain: Any, spare: Any, n: int, packed: Any, max_sweeps: int) -> int:
     """Pull a band taut in place; return its number of points, or -1 without room for them.
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
-
+from systems.compilation import compiled
 from systems.rope.band.contraction_kernels import (
     CLEARANCE,
     apart,
@@ -24,7 +23,7 @@ _MAX_LINKS = 20
 _NO_WAY = (0.0, 0.0, 0.0)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def start_chain(chain: Any, x: float, y: float, z: float, packed: Any) -> int:
     """Start a chain with a gripper's position; -1 if the gripper is in collision."""
     d = distance(x, y, z, packed)
@@ -32,14 +31,14 @@ def start_chain(chain: Any, x: float, y: float, z: float, packed: Any) -> int:
     return 1 if d >= CLEARANCE else -1
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def append(chain: Any, n: int, x: float, y: float, z: float, packed: Any) -> int:
     """Append a point that is known to be linked to the last one."""
     put(chain, n, (x, y, z, distance(x, y, z, packed)), 1.0)
     return n + 1
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def link(chain: Any, n: int, x: float, y: float, z: float, packed: Any) -> int:
     """Append a point, pushed out, and what it takes to get there; -1 if that fails."""
     if n < 0:
@@ -66,7 +65,7 @@ def link(chain: Any, n: int, x: float, y: float, z: float, packed: Any) -> int:
     return -1
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def n_points(row: Any) -> int:
     """Count the points of a band's row; the last one fills what remains."""
     n = (row.shape[0] - 6) // 3
@@ -79,7 +78,7 @@ def n_points(row: Any) -> int:
     return n
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def chain_length(chain: Any, n: int) -> float:
     """Length of a band."""
     total = 0.0
@@ -88,7 +87,7 @@ def chain_length(chain: Any, n: int) -> float:
     return total
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def write_row(chain: Any, n: int, row: Any) -> None:
     """Write a band as a row: gripper A, gripper B, its points, the last one repeated."""
     for k in range(3):
@@ -98,7 +97,7 @@ def write_row(chain: Any, n: int, row: Any) -> None:
             row[6 + 3 * i + k] = chain[min(i, n - 1), k]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def propagate_row(
     row: Any, command: Any, packed: Any, max_length: float, chain: Any, spare: Any, out: Any
 ) -> bool:
@@ -125,7 +124,7 @@ def propagate_row(
     return True
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def propagate_rows(
     rows: Any, commands: Any, packed: Any, max_length: float, workspace: Any, out: Any, valid: Any
 ) -> None:
@@ -136,7 +135,7 @@ def propagate_rows(
         )
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def reduce_points(points: Any, packed: Any, workspace: Any, out: Any) -> int:
     """Write r of a curve from gripper to gripper to ``out``; return 1, or a failure's code.
 

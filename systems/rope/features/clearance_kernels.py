@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from systems.compilation import compiled
 from systems.rope.band.propagation_kernels import n_points
 from systems.rope.features.component_kernels import LEAST_WIDTH, parabola_bend
 from systems.rope.kernels import length_between
@@ -22,7 +22,7 @@ NEAREST, FARTHEST, UNIT = -0.05, 0.15, 0.05
 LEAST_SPAN = 1e-6
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def segment_length(row: Any, i: int, flat: bool) -> float:
     """Length of a band's segment from point ``i``, or of its shadow on a flat floor."""
     first = 6 + 3 * i
@@ -34,7 +34,7 @@ def segment_length(row: Any, i: int, flat: bool) -> float:
     return np.sqrt(shadow**2 + rise * rise)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def length_of(row: Any, flat: bool) -> float:
     """Length of a band, or of its shadow."""
     total = 0.0
@@ -43,7 +43,7 @@ def length_of(row: Any, flat: bool) -> float:
     return total
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_band_points(row: Any, length: float, flat: bool, tops: Any) -> None:
     """Write the points of a band that columns hang from: evenly along it, or along its shadow."""
     n = n_points(row)
@@ -60,13 +60,13 @@ def fill_band_points(row: Any, length: float, flat: bool, tops: Any) -> None:
             tops[column, k] = row[first + k] + ratio * (row[first + 3 + k] - row[first + k])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def clipped_distance(x: float, y: float, z: float, packed: Any) -> float:
     """Distance to the obstacles in units, where it matters."""
     return min(FARTHEST, max(NEAREST, distance(x, y, z, packed))) / UNIT
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def hanging(row: Any, shadow: float, rope_length: float) -> tuple[float, float]:
     """Return the width and the bend of the parabola that the rope would hang in."""
     width, rise = max(shadow, LEAST_WIDTH), row[5] - row[2]
@@ -75,7 +75,7 @@ def hanging(row: Any, shadow: float, rope_length: float) -> tuple[float, float]:
     return width, 0.0
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_depths(rows: Any, rope_length: float, depths: Any) -> None:
     """Write how deep the rope of each row hangs."""
     for i in range(rows.shape[0]):
@@ -84,7 +84,7 @@ def fill_depths(rows: Any, rope_length: float, depths: Any) -> None:
         depths[i] = 0.25 * bend * width * width
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_hanging_clearance(row: Any, packed: Any, rope_length: float, tops: Any, out: Any) -> float:
     """Write distances on a grid that hangs from a band; return how deep the rope hangs.
 
@@ -104,7 +104,7 @@ def fill_hanging_clearance(row: Any, packed: Any, rope_length: float, tops: Any,
     return 0.25 * bend * width * width
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def direction(row: Any) -> tuple[float, float]:
     """Return the horizontal direction from gripper A to gripper B."""
     x, y = row[3] - row[0], row[4] - row[1]
@@ -114,7 +114,7 @@ def direction(row: Any) -> tuple[float, float]:
     return 1.0, 0.0
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_slack_clearance(
     row: Any, nodes: Any, packed: Any, tops: Any, sheet: Any, offsets: Any
 ) -> None:
@@ -141,7 +141,7 @@ def fill_slack_clearance(
             sheet[column, j] = clipped_distance(px + away * x, py + away * y, pz + away * z, packed)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_hanging_clearances(
     rows: Any, packed: Any, rope_length: float, out: Any, depths: Any
 ) -> None:
@@ -151,7 +151,7 @@ def fill_hanging_clearances(
         depths[i] = fill_hanging_clearance(rows[i], packed, rope_length, tops, out[i])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_slack_clearances(
     bands: Any, ropes: Any, n_nodes: int, packed: Any, sheets: Any, offsets: Any, lengths: Any
 ) -> None:

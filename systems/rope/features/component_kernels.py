@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from systems.compilation import compiled
 from systems.rope.obstacles.signed_distance_kernels import distance
 
 CELL = 0.0125
@@ -17,7 +17,7 @@ _OUTSIDE, _OCCUPIED, _FREE, _SEEN = 0, 1, 2, 3
 _BISECTIONS = 60
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def parabola_length(bend: float, width: float, rise: float) -> float:
     """Arc length of rise/width * s - bend * s * (width - s), for s from 0 to ``width``."""
     start, end = rise / width - bend * width, rise / width + bend * width
@@ -28,7 +28,7 @@ def parabola_length(bend: float, width: float, rise: float) -> float:
     return (at_end - at_start) / (4.0 * bend)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def parabola_bend(width: float, rise: float, length: float) -> float:
     """Bend of the parabola whose arc has a length; 0 where even the chord is longer."""
     low, high = 0.0, 4.0 * (length + abs(rise)) / (width * width)
@@ -41,7 +41,7 @@ def parabola_bend(width: float, rise: float, length: float) -> float:
     return low
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_slice(row: Any, packed: Any, length: float, cells: Any) -> tuple[int, int]:
     """Mark the cells of the vertical slice between chord and parabola as free or occupied.
 
@@ -81,7 +81,7 @@ def fill_slice(row: Any, packed: Any, length: float, cells: Any) -> tuple[int, i
     return n, m
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def count_components(cells: Any, n: int, m: int, stack: Any) -> tuple[int, int]:
     """Count the connected parts that are free and occupied, and mark their cells as seen."""
     n_free, n_occupied = 0, 0
@@ -105,7 +105,7 @@ def count_components(cells: Any, n: int, m: int, stack: Any) -> tuple[int, int]:
     return n_free, n_occupied
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_components(
     rows: Any, packed: Any, length: float, cells: Any, stack: Any, out: Any
 ) -> None:

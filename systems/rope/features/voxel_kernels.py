@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from systems.compilation import compiled
 from systems.rope.band.comparison_kernels import resample_row
 from systems.rope.obstacles.signed_distance_kernels import EMPTY, capsule_distance
 
@@ -17,13 +17,13 @@ _TOP = np.uint32(1 << (SIDE - 1))
 _NONE, _ALL = np.uint32(0), np.uint32(0xFFFFFFFF)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@compiled(inline="always")
 def cells_below(k: int) -> np.uint32:
     """Mark the lowest k cells of a column."""
     return _ALL if k <= 0 else np.uint32((np.uint64(1) << np.uint64(SIDE - k)) - np.uint64(1))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def index_range(centers: Any, middle: float, half: float) -> tuple[int, int]:
     """First index whose centre is within ``half`` of ``middle``, and the one after the last."""
     first, end = 0, centers.shape[0]
@@ -34,13 +34,13 @@ def index_range(centers: Any, middle: float, half: float) -> tuple[int, int]:
     return first, end
 
 
-@njit(cache=True, nogil=True, inline="always")
+@compiled(inline="always")
 def column(first: int, end: int) -> np.uint32:
     """Mark the cells of a column from ``first`` up to ``end``."""
     return cells_below(first) & ~(cells_below(end) if end > 0 else _ALL)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_outside(centers: Any, bounds: Any, columns: Any) -> None:
     """Occupy all that lies outside the world; free the rest."""
     sky = _NONE
@@ -54,7 +54,7 @@ def fill_outside(centers: Any, bounds: Any, columns: Any) -> None:
             columns[i, j] = _ALL if out else sky
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def add_box(centers: Any, row: Any, columns: Any) -> None:
     """Occupy the cells whose centres lie in a box."""
     i0, i1 = index_range(centers[0], row[1], row[4])
@@ -67,7 +67,7 @@ def add_box(centers: Any, row: Any, columns: Any) -> None:
                 columns[i, j] |= mark
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def add_cylinder(centers: Any, row: Any, columns: Any) -> None:
     """Occupy the cells whose centres lie in a cylinder along an axis."""
     axis, radius = int(row[4]), row[7]
@@ -84,7 +84,7 @@ def add_cylinder(centers: Any, row: Any, columns: Any) -> None:
                     columns[i, j] |= _TOP >> np.uint32(k)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def add_capsule(centers: Any, row: Any, columns: Any) -> None:
     """Occupy the cells whose centres lie in a capsule."""
     reach = row[7] * (1.0 + 1e-9)  # Rounding must not lose the cells at its ends.
@@ -99,7 +99,7 @@ def add_capsule(centers: Any, row: Any, columns: Any) -> None:
                     columns[i, j] |= _TOP >> np.uint32(k)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_surroundings(centers: Any, bounds: Any, packed: Any, columns: Any) -> None:
     """Occupy the cells whose centres are not in free space."""
     fill_outside(centers, bounds, columns)
@@ -113,7 +113,7 @@ def fill_surroundings(centers: Any, bounds: Any, packed: Any, columns: Any) -> N
             add_capsule(centers, row, columns)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def add_points(points: Any, origin: Any, per_metre: float, cells: Any) -> None:
     """Occupy the cells that points are in; points beyond the grid are left out."""
     for index in range(points.shape[0]):
@@ -125,7 +125,7 @@ def add_points(points: Any, origin: Any, per_metre: float, cells: Any) -> None:
             cells[((int(x) * SIDE + int(y)) * SIDE + k) >> 3] |= np.uint8(128 >> (k & 7))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def write_columns(columns: Any, cells: Any) -> None:
     """Write columns as bytes, the lowest cells first."""
     at = 0
@@ -139,7 +139,7 @@ def write_columns(columns: Any, cells: Any) -> None:
             at += 4
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_voxels(
     rows: Any,
     next_rows: Any,

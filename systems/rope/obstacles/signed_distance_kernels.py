@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from systems.compilation import compiled
 
 EMPTY = 1e9  # distance to an environment without obstacles
 
 
-@njit(cache=True, nogil=True, inline="always")
+@compiled(inline="always")
 def cylinder_distance(x: float, y: float, z: float, row: Any, bound: float) -> float:
     """Signed distance to a cylinder along an axis, or ``bound`` where it is no smaller."""
     u, v, w = x - row[1], y - row[2], z - row[3]
@@ -28,7 +29,7 @@ def cylinder_distance(x: float, y: float, z: float, row: Any, bound: float) -> f
     return np.sqrt(radial * radial + axial * axial)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@compiled(inline="always")
 def capsule_distance(x: float, y: float, z: float, row: Any, bound: float) -> float:
     """Signed distance to a capsule, or ``bound`` where it is no smaller."""
     u, v, w = x - row[1], y - row[2], z - row[3]
@@ -42,7 +43,7 @@ def capsule_distance(x: float, y: float, z: float, row: Any, bound: float) -> fl
     return np.sqrt(square) - row[7]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def nearest_obstacle(x: float, y: float, z: float, packed: Any) -> tuple[float, int]:
     """Return the signed distance to the nearest obstacle and its row, or -1 without any."""
     n = packed.shape[0]
@@ -76,13 +77,13 @@ def nearest_obstacle(x: float, y: float, z: float, packed: Any) -> tuple[float, 
     return distance, index
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def distance(x: float, y: float, z: float, packed: Any) -> float:
     """Signed distance to the nearest obstacle."""
     return nearest_obstacle(x, y, z, packed)[0]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def box_gradient(x: float, y: float, z: float, row: Any) -> tuple[float, float, float]:
     """Gradient of the signed distance to a box."""
     u, v, w = x - row[1], y - row[2], z - row[3]
@@ -97,7 +98,7 @@ def box_gradient(x: float, y: float, z: float, row: Any) -> tuple[float, float, 
     return su * a / norm, sv * b / norm, sw * c / norm
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def cylinder_gradient(x: float, y: float, z: float, row: Any) -> tuple[float, float, float]:
     """Gradient of the signed distance to a cylinder along an axis."""
     u, v, w = x - row[1], y - row[2], z - row[3]
@@ -120,7 +121,7 @@ def cylinder_gradient(x: float, y: float, z: float, row: Any) -> tuple[float, fl
     return (e0, e2, e1) if row[4] == 1.0 else (e0, e1, e2)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def capsule_gradient(x: float, y: float, z: float, row: Any) -> tuple[float, float, float]:
     """Gradient of the signed distance to a capsule."""
     u, v, w = x - row[1], y - row[2], z - row[3]
@@ -138,7 +139,7 @@ def capsule_gradient(x: float, y: float, z: float, row: Any) -> tuple[float, flo
     return -row[5] / norm, row[4] / norm, 0.0
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def gradient(x: float, y: float, z: float, row: Any) -> tuple[float, float, float]:
     """Gradient of the signed distance to one obstacle."""
     if row[0] == 0.0:
@@ -148,7 +149,7 @@ def gradient(x: float, y: float, z: float, row: Any) -> tuple[float, float, floa
     return capsule_gradient(x, y, z, row)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def distance_and_gradient(
     x: float, y: float, z: float, packed: Any
 ) -> tuple[float, float, float, float]:
@@ -160,14 +161,14 @@ def distance_and_gradient(
     return d, gx, gy, gz
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_distances(points: Any, packed: Any, distances: Any) -> None:
     """Write the signed distance of each point."""
     for i in range(points.shape[0]):
         distances[i] = distance(points[i, 0], points[i, 1], points[i, 2], packed)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def fill_distances_and_gradients(points: Any, packed: Any, distances: Any, gradients: Any) -> None:
     """Write the signed distance of each point and its gradient."""
     for i in range(points.shape[0]):

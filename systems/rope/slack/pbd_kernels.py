@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from systems.compilation import compiled
 from systems.rope.kernels import length_between
 from systems.rope.obstacles.signed_distance_kernels import gradient, nearest_obstacle
 
@@ -27,7 +27,7 @@ SWEEPS = 2
 MOST_TOGETHER = 16
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def read_rope(row: Any, q: Any, points: Any, moved: Any, lane: int) -> None:
     """Read a PBD rope between grippers at ``q``: nodes, and their last displacements."""
     last = points.shape[0] - 1
@@ -39,7 +39,7 @@ def read_rope(row: Any, q: Any, points: Any, moved: Any, lane: int) -> None:
             moved[i + 1, k, lane] = row[half + 3 * i + k]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def write_rope(points: Any, moved: Any, lane: int, row: Any) -> float:
     """Write what :func:`read_rope` reads; return how long the rope is."""
     last = points.shape[0] - 1
@@ -51,7 +51,7 @@ def write_rope(points: Any, moved: Any, lane: int, row: Any) -> float:
     return length_between(points[::last, :, lane], points[1:last, :, lane])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(error_model="numpy")
 def shorten_links(points: Any, i: int, spacing: float) -> None:
     """Pull two neighbours of each rope together until their link is no longer than it should be."""
     j, last = i + 1, points.shape[0] - 1
@@ -73,7 +73,7 @@ def shorten_links(points: Any, i: int, spacing: float) -> None:
         points[j, 2, lane] -= far * excess * z
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def push_out(
     points: Any, i: int, lane: int, before: Any, friction: float, radius: float, packed: Any
 ) -> float:
@@ -97,7 +97,7 @@ def push_out(
     return radius
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def step_ropes(
     points: Any, moved: Any, before: Any, clear: Any, spacing: float, kinds: Any, packed: Any
 ) -> None:
@@ -129,7 +129,7 @@ def step_ropes(
                 moved[i, k, lane] = KEPT * (points[i, k, lane] - before[i, k, lane])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def move_together(
     points: Any,
     moved: Any,
@@ -154,7 +154,7 @@ def move_together(
         step_ropes(points, moved, before, clear, spacing, kinds, packed)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def strides_of(command: Any) -> int:
     """Return how many strides a command of the grippers is carried out in."""
     longest = 0.0
@@ -164,7 +164,7 @@ def strides_of(command: Any) -> int:
     return max(1, int(np.ceil(longest / LONGEST_STRIDE - 1e-9)))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def move_pbd_ropes(
     rows: Any,
     q: Any,
