@@ -71,10 +71,9 @@ def test_other_counts_are_refused(value):
         check_count(value, "n")
 
 
+@pytest.mark.parametrize(
     "value",
-    [2, 5, 3.5, np.float32(5), np.float16(2), np.int32(3), np.longdouble(4), Fraction(7, 2)],
-    "value",
-    [2, 5, 3.5, np.float32(5), np.float16(2), np.int32(3), np.longdouble(4), Fraction(7, 2)],
+    [2, 5, 3.5, np.float32(5), np.float16(2), np.int32(3), Fraction(5, 2)],
 )
 def test_numbers_pass_and_limits_are_included(value):
     check_number(value, "k", 2, 5)
