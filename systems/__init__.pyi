@@ -3,7 +3,7 @@ from .car.scenes import CarScene as CarScene
 from .car.scenes import Circle as Circle
 from .car.scenes import ConvexPolygon as ConvexPolygon
 from .car.scenes import random_car_scene as random_car_scene
-from .contract_checks import check_system as check_system
+from .contract_checks.check_system import check_system as check_system
 from .errors import SimulationDivergedError as SimulationDivergedError
 from .errors import SystemContractError as SystemContractError
 from .planar_arm.planar_arm import PlanarArm as PlanarArm
