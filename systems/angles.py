@@ -1,4 +1,4 @@
-"""Angles that wrap: one representative in [-π, π), and the short way round."""
+"""Angles in radians, for which -π and π are the same: brought to [-π, π), and subtracted."""
 
 from __future__ import annotations
 
@@ -13,21 +13,27 @@ TURN = 2 * np.pi
 
 @compiled
 def wrap_angle(angle: float) -> float:
-    """Return the same angle in [-π, π), itself if it is there already."""
+    """Return an angle plus the multiple of 2π that brings it to [-π, π)."""
     if -np.pi <= angle < np.pi:
         return angle
+    # Rounding can give π itself, which is -π.
     wrapped = angle - TURN * np.floor((angle + np.pi) / TURN)
     return wrapped if wrapped < np.pi else -np.pi
 
 
 def wrap_columns(rows: Array, angular: tuple[int, ...]) -> Array:
-    """Return ``rows`` with the entries ``angular`` brought to [-π, π).
+    """Bring the columns that hold angles to [-π, π).
 
     Parameters
     ----------
     rows : ndarray of shape (..., d)
     angular : tuple of int
-        Indices of the last axis.
+        Indices along the last axis.
+
+    Returns
+    -------
+    wrapped : ndarray of shape (..., d)
+        A copy, or ``rows`` itself if there are no angles.
     """
     if not angular:
         return rows
@@ -44,12 +50,17 @@ def _wrap_in_place(rows: Array, angular: tuple[int, ...]) -> None:
 
 
 def shortest_way(starts: Array, ends: Array, angular: tuple[int, ...]) -> Array:
-    """Return ``ends - starts``, along the short way round in the entries ``angular``.
+    """Return ``ends - starts``, for angles along the shorter way around the circle.
 
     Parameters
     ----------
     starts, ends : ndarray of shape (..., d)
     angular : tuple of int
-        Indices of the last axis.
+        Indices along the last axis of the columns that hold angles.
+
+    Returns
+    -------
+    way : ndarray of shape (..., d)
+        Angles in [-π, π).
     """
     return wrap_columns(ends - starts, angular)

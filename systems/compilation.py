@@ -1,10 +1,9 @@
-"""Compiling hot loops with numba, kept on disk for as long as their sources stay the same."""
+"""Compilation of hot loops with numba, whose machine code is kept until a source file changes."""
 
 from __future__ import annotations
 
 import hashlib
 import os
-import re
 import shutil
 import tempfile
 import threading
@@ -17,27 +16,31 @@ from typing import Any
 
 from numba import config, njit
 
-_IMPORT = re.compile(r"^\s*(?:from|import)\s+((?:systems|reliability|planners)[\w.]*)", re.M)
-# numba reads the folder from a variable of the process when a function is decorated.
-_one_at_a_time = threading.Lock()
+LIBRARY = ("systems", "reliability", "planners")
+# numba reads the cache folder from a global variable when a function is decorated.
+_one_decoration_at_a_time = threading.Lock()
 
 
 def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """Compile a function with numba, without the GIL, and keep the machine code on disk.
+    """Compile a function of this library with numba, without the GIL, and cache the machine code.
 
-    Numba alone looks only at the file of the function itself, and would go on running old code
-    after a change in a file that this one imports. Here machine code is kept under a digest of the
-    module and of all modules of this library that it imports, directly or not.
+    numba's own cache checks only the file that a function is in. After a change in another file
+    that this file imports constants or functions from, it would still run the old code. Here the
+    cache folder is named by a digest of the module's source and of the source of every module of
+    this library that it imports, directly or indirectly, so that a change in any of them compiles
+    the module anew. Only imports by full module name are followed, as in
+    ``from systems.angles import wrap_angle``.
 
-    The code is kept in the folder that the environment variable ``NUMBA_CACHE_DIR`` names, else
-    beside the library, else in the user's cache folder (``XDG_CACHE_HOME`` or ``~/.cache``),
-    whichever can be written first. Where none can, every process compiles anew, and a warning says
-    so once.
+    The cache is placed in the first of these folders that can be written: the one that the
+    environment variable ``NUMBA_CACHE_DIR`` names; ``systems/__pycache__``; the user's cache
+    folder (``XDG_CACHE_HOME``, by default ``~/.cache``). If none can be written, or if the
+    library's sources are not files (in a zip archive, or only .pyc files), nothing is cached and
+    every process compiles what it uses.
 
     Parameters
     ----------
     function : callable
-        A function of a module of this library.
+        A function at the top level of a module of this library.
     **options
         Further options of ``numba.njit``, such as ``inline`` and ``fastmath``.
 
@@ -48,14 +51,14 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     Warns
     -----
     RuntimeWarning
-        Once per process, where no folder for machine code can be written.
+        Once per process, if nothing can be cached.
     """
     if function is None:
         return lambda given: compiled(given, **options)
-    folder = _code_folder(function.__module__)
+    folder = _cache_folder(function.__module__)
     if folder is None:
         return njit(nogil=True, **options)(function)
-    with _one_at_a_time:
+    with _one_decoration_at_a_time:
         before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
         try:
             return njit(nogil=True, cache=True, **options)(function)
@@ -63,85 +66,103 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
             config.CACHE_DIR = before
 
 
-@cache
-def _code_folder(module: str) -> Path | None:
-    """Return the folder for a module's machine code, emptied of what older sources gave."""
-    base = _writable_base()
-    if base is None:
-        return None
-    folder = base / f"{module}-{source_digest(module)}"
-    if not folder.exists():
-        for outdated in base.glob(f"{module}-*"):
-            shutil.rmtree(outdated, ignore_errors=True)
-        folder.mkdir(exist_ok=True)
-    return folder
-
-
-def source_digest(module: str) -> str:
+def source_digest(module: str) -> str | None:
     """Return a digest of a module's source and of all that it imports from this library.
 
     Parameters
     ----------
     module : str
-        Its dotted name.
+        Its full name, such as "systems.car.dynamics".
 
     Returns
     -------
-    digest : str
-        16 hexadecimal digits.
+    digest : str or None
+        16 hexadecimal digits; None if one of the sources is not a file.
     """
-    seen: dict[str, bytes] = {}
+    sources: dict[str, bytes] = {}
     waiting = [module]
     while waiting:
         name = waiting.pop()
-        if name in seen:
+        if name in sources:
             continue
-        seen[name] = _source(name)
-        waiting += _IMPORT.findall(seen[name].decode())
+        source, imported = _source_and_imports(name)
+        if source is None:
+            return None
+        sources[name] = source
+        waiting += imported
     total = hashlib.blake2b(digest_size=8)
-    for name in sorted(seen):
-        total.update(name.encode() + b"\0" + seen[name] + b"\0")
+    for name in sorted(sources):
+        total.update(b"%s\0%d\0" % (name.encode(), len(sources[name])) + sources[name])
     return total.hexdigest()
 
 
 @cache
-def _source(module: str) -> bytes:
-    try:
-        spec = find_spec(module)
-    except ModuleNotFoundError:  # a name inside a module, as in "import systems.angles.wrap"
-        return b""
-    if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
-        return b""
-    return Path(spec.origin).read_bytes()
+def _source_and_imports(module: str) -> tuple[bytes | None, list[str]]:
+    """Return a module's source and the modules of this library that its top level imports."""
+    spec: Any = find_spec(module)
+    if not spec.origin.endswith(".py") or not os.path.exists(spec.origin):
+        return None, []
+    # The names that the top level uses, among them those of imported modules, in full.
+    names = spec.loader.get_code(module).co_names
+    imported = [name for name in names if name.split(".")[0] in LIBRARY]
+    for package in filter(_is_package, imported.copy()):  # as in "from systems import angles"
+        inside = [f"{package}.{name}" for name in names if "." not in name]
+        imported += filter(find_spec, inside)
+    return Path(spec.origin).read_bytes(), imported
+
+
+def _is_package(module: str) -> bool:
+    spec = find_spec(module)
+    return spec is not None and spec.submodule_search_locations is not None
 
 
 @cache
-def _writable_base() -> Path | None:
-    for candidate in _bases():
+def _cache_folder(module: str) -> Path | None:
+    """Return the folder for a module's machine code, and delete those of its older versions."""
+    base, digest = _cache_base(), source_digest(module)
+    if base is None or digest is None:
+        _warn_once()
+        return None
+    folder = base / f"{module}-{digest}"
+    if not folder.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        for other in base.glob(f"{module}-*"):
+            if other != folder:
+                shutil.rmtree(other, ignore_errors=True)
+    return folder
+
+
+@cache
+def _cache_base() -> Path | None:
+    for candidate in _candidates():
         try:
             candidate.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=candidate):
                 return candidate
         except OSError:
             continue
-    warnings.warn(
-        "Compiled code can't be kept, as no folder for it can be written, so each process compiles "
-        "anew, which takes a minute or so. Set NUMBA_CACHE_DIR to a folder that can be written.",
-        RuntimeWarning,
-        stacklevel=2,
-    )
     return None
 
 
-def _bases() -> list[Path]:
+def _candidates() -> list[Path]:
     library = Path(__file__).resolve().parent
-    name = "transition-reliability"
-    if config.CACHE_DIR:
-        return [Path(config.CACHE_DIR) / name]
-    bases = [library / "__pycache__" / "numba"]
-    # Several copies of the library must not take turns in throwing out one another's code.
-    place = hashlib.blake2b(bytes(library), digest_size=6).hexdigest()
+    # Two copies of this library share a user's folders; neither may delete the other's code.
+    own = Path("transition-reliability", hashlib.blake2b(bytes(library), digest_size=6).hexdigest())
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    shared = [config.CACHE_DIR] if config.CACHE_DIR else []
+    candidates = [Path(folder) / own for folder in shared]
+    candidates.append(library / "__pycache__" / "numba")
     if os.path.isabs(home):
-        bases.append(Path(home) / name / place)
-    return bases
+        candidates.append(Path(home) / own)
+    return candidates
+
+
+@cache
+def _warn_once() -> None:
+    warnings.warn(
+        "Machine code can't be cached, so each process compiles what it uses, which takes a minute "
+        "or so. Set NUMBA_CACHE_DIR to a folder that can be written, and install the library as "
+        "source files.",
+        RuntimeWarning,
+        stacklevel=2,
+    )

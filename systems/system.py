@@ -1,4 +1,4 @@
-"""What a system is: a robot in one scene, with its reduced model and its true execution."""
+"""The interface of a system: a robot in one scene, with a reduced model and a true execution."""
 
 from __future__ import annotations
 
@@ -17,24 +17,26 @@ Array = NDArray[np.float64]
 
 
 class StopReason(Enum):
-    """Why a rollout ended; each value reads as a sentence."""
+    """Why a rollout ended; each value is a sentence.
+
+    A system whose rollouts can end for several reasons tells them apart with an enum of its own,
+    whose values are sentences too.
+    """
 
     COMPLETED = "Every command was carried out."
     CONSTRAINT = "The system reached the boundary of a constraint and stopped there."
-    GRIPPER_CONTACT = "A gripper would have touched an obstacle and stopped before it."
-    OVERSTRETCHED = "The rope reached its largest allowed stretch and stopped there."
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A planning problem.
+    """A start and a goal.
 
     Attributes
     ----------
     start : object
-        True state x_0.
+        A true state, the paper's x_0.
     goal : ndarray of shape (n_goals, configuration_dim)
-        Configurations, any of which will do.
+        Goal configurations; a plan has to reach one of them.
     """
 
     start: Any
@@ -48,43 +50,47 @@ class Rollout:
     Attributes
     ----------
     states : sequence of states, or array with a state per row
-        The start, one state per completed command, then the boundary state if it stopped.
+        The start, the state after each completed command and, if the execution stopped at the
+        boundary of a constraint, the state there.
     n_completed : int
-        Commands that were carried out to their end.
-    stop_reason : StopReason
+        How many commands were carried out to their end.
+    stop_reason : Enum
+        ``StopReason.COMPLETED`` if, and only if, every command was carried out; otherwise
+        ``StopReason.CONSTRAINT`` or a member of the system's own enum, whose value is a sentence.
     """
 
     states: Sequence[Any] | Array
     n_completed: int
-    stop_reason: StopReason
+    stop_reason: Enum
 
 
 class System(ABC):
-    """A robot in one scene E, seen three ways: truly, reduced, and as features.
+    """A robot in one scene (the paper's environment E): its true execution and a reduced model.
 
     Subclass it to plan for a system of your own, and pass an instance to
-    :func:`systems.check_system` to learn whether the planners can use it.
+    :func:`systems.check_system`, which raises if planners could not use it.
 
-    A *reduced state* b is a float64 vector of length ``reduced_dim``. Its leading
-    ``configuration_dim`` entries are the configuration q, in which planners sample, measure
-    and steer; the rest is carried along by :meth:`propagate`. Methods that take reduced
-    states take many of them, as rows. A system must pickle, and should start a simulator
-    only when a rollout needs it.
+    A *reduced state* b is a float64 vector of length ``reduced_dim``. Its first
+    ``configuration_dim`` entries are the *configuration* q: planners sample configurations,
+    measure distances between them and steer from one to another. The other entries follow from
+    :meth:`propagate` alone. Methods that take reduced states take an array with one per row. A
+    system must pickle, and should start a simulator only when a rollout needs it.
 
     Attributes
     ----------
     reduced_dim : int
     configuration_dim : int
     step_size : float
-        Largest change ‖q' − q‖ of one transition.
+        The largest distance ‖q' − q‖ that one transition may cover.
     bounds : ndarray of shape (2, configuration_dim)
-        Lower and upper limits of the configurations that planners sample.
+        Lower limits (first row) and upper limits of the configurations that planners sample.
     angular : tuple of int, default=()
-        Indices of the configuration's entries that are angles which wrap. They are in [-π, π),
-        and planners measure and steer the short way round; so must ``steer`` and ``propagate``.
+        Indices of the entries of a configuration that are angles, for which -π and π are the same.
+        They lie in [-π, π), and planners measure the shorter way around the circle between two
+        of them. ``steer`` must go that way, and ``propagate`` must return angles in [-π, π).
     independent_parts : tuple of slice, default=()
-        Parts of the configuration that can move while the rest stands still, as either gripper
-        of the rope. Planners also shorten the ways of one part alone.
+        Parts of the configuration that can move while the others stand still, such as each of the
+        rope's two grippers. Planners then also shorten the path of one part at a time.
 
     References
     ----------
@@ -100,7 +106,11 @@ class System(ABC):
 
     @abstractmethod
     def reduce(self, state: Any) -> Array:
-        """Reduce one true state: the paper's r.
+        """Return the reduced state of one true state: the paper's r.
+
+        Parameters
+        ----------
+        state : object
 
         Returns
         -------
@@ -120,12 +130,16 @@ class System(ABC):
         -------
         next_reduced : ndarray of shape (n, reduced_dim)
         valid : ndarray of bool of shape (n,)
-            False where g has no successor, the paper's ∅.
+            False where g has no successor (the paper's ∅); what ``next_reduced`` holds in such a
+            row does not matter.
         """
 
     @abstractmethod
     def steer(self, reduced: Array, configuration: Array) -> Array:
-        """Return, for each row, the command of at most one step towards a configuration.
+        """Return, for each row, the command that moves one step towards a configuration.
+
+        A step covers ``step_size``, or less if the configuration is nearer; then
+        :meth:`propagate` must arrive at it exactly.
 
         Parameters
         ----------
@@ -139,14 +153,19 @@ class System(ABC):
 
     @abstractmethod
     def rollout(self, state: Any, commands: Array) -> Rollout:
-        """Execute commands in turn from a true state: the paper's Γ, repeated.
+        """Execute commands one after the other from a true state: the paper's Γ, repeated.
 
-        The execution stops on the boundary of a constraint and never violates it.
+        The execution stops at the boundary of a constraint and never violates it. The same state
+        and commands must always give the same rollout.
 
         Parameters
         ----------
         state : object
         commands : ndarray of shape (T, command_dim)
+
+        Returns
+        -------
+        Rollout
 
         Raises
         ------
@@ -156,7 +175,9 @@ class System(ABC):
 
     @abstractmethod
     def close(self, predicted: Array, executed: Array) -> NDArray[np.bool_]:
-        """Say, row by row, whether two reduced states are meaningfully similar: Close.
+        """Say for each row whether the two reduced states are similar: the paper's Close.
+
+        A transition is labelled Reliable if what g predicts is close to what was executed.
 
         Parameters
         ----------
@@ -169,7 +190,7 @@ class System(ABC):
 
     @abstractmethod
     def features(self, reduced: Array, next_reduced: Array) -> NDArray[Any]:
-        """Describe transitions in this scene to an estimator.
+        """Return what an estimator sees of transitions in this scene.
 
         Parameters
         ----------
@@ -178,16 +199,27 @@ class System(ABC):
         Returns
         -------
         X : ndarray of shape (n, n_features)
+            Whatever matters of the scene has to be in these numbers.
         """
 
     @abstractmethod
     def sample_problem(self, random_state: RandomState = None) -> Problem:
-        """Draw a start state and a goal."""
+        """Draw a start state and a goal.
+
+        Parameters
+        ----------
+        random_state : None, int, SeedSequence, Generator or RandomState
+            The same integer gives the same problem.
+
+        Returns
+        -------
+        Problem
+        """
 
     def sample_configurations(self, rng: np.random.Generator, n: int) -> Array:
-        """Draw configurations for :class:`planners.BiasedRRT` to grow towards.
+        """Draw the configurations that :class:`planners.BiasedRRT` grows its tree towards.
 
-        Uniform within ``bounds``; override it where few of those make sense.
+        They are uniform within ``bounds``; override this where few of those make sense.
 
         Parameters
         ----------
@@ -203,7 +235,7 @@ class System(ABC):
 
     @abstractmethod
     def goal_reached(self, reduced: Array, goal: Array) -> NDArray[np.bool_]:
-        """Say, row by row, whether a reduced state is a goal for the planner: Goal_B.
+        """Say for each row whether a reduced state is at the goal: the paper's Goal_B.
 
         Parameters
         ----------
@@ -217,4 +249,12 @@ class System(ABC):
 
     @abstractmethod
     def succeeded(self, state: Any, goal: Array, tolerance: float) -> bool:
-        """Say whether a true state is within ``tolerance`` of the goal: Goal_X."""
+        """Say whether a true state is within a tolerance of the goal: the paper's Goal_X.
+
+        Parameters
+        ----------
+        state : object
+        goal : ndarray of shape (n_goals, configuration_dim)
+        tolerance : float
+            In the units of the configuration; every state is within ``np.inf``.
+        """

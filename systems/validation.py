@@ -1,13 +1,18 @@
-"""Checks of arguments that every door of the library shares."""
+"""Checks of arguments that all public functions share."""
 
 from __future__ import annotations
 
-from typing import Any
+from numbers import Integral, Real
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 RandomState = None | int | np.random.SeedSequence | np.random.Generator | np.random.RandomState
+
+# Kinds of numpy types that become float64 without loss of meaning: booleans, integers, floats,
+# and Python objects, which may be numbers.
+REAL_KINDS = "biufO"
 
 
 def as_generator(random_state: RandomState) -> np.random.Generator:
@@ -16,8 +21,12 @@ def as_generator(random_state: RandomState) -> np.random.Generator:
     Parameters
     ----------
     random_state : None, int, SeedSequence, Generator or RandomState
-        None draws fresh entropy; a generator is returned as it is, so that it advances;
-        a ``RandomState`` is drawn from once.
+        None gives a generator that differs in each call. A Generator is returned itself, so that
+        the caller's advances. From a RandomState one seed is drawn.
+
+    Returns
+    -------
+    rng : Generator
 
     Raises
     ------
@@ -28,42 +37,67 @@ def as_generator(random_state: RandomState) -> np.random.Generator:
         return random_state
     if isinstance(random_state, np.random.RandomState):
         return np.random.default_rng(random_state.randint(2**32, dtype=np.uint64))
-    is_integer = isinstance(random_state, int | np.integer) and not isinstance(random_state, bool)
-    if random_state is None or is_integer or isinstance(random_state, np.random.SeedSequence):
-        if is_integer and int(random_state) < 0:  # type: ignore[arg-type]
-            raise ValueError(f"random_state must not be negative, got {random_state}.")
+    if random_state is None or isinstance(random_state, np.random.SeedSequence):
         return np.random.default_rng(random_state)
-    raise ValueError(
-        "random_state must be None, an integer, or a numpy SeedSequence, Generator or "
-        f"RandomState, got {random_state!r}."
-    )
+    if not is_integer(random_state):
+        raise ValueError(
+            "random_state must be None, an integer, or a numpy SeedSequence, Generator or "
+            f"RandomState, got {random_state!r}."
+        )
+    if random_state < 0:
+        raise ValueError(f"random_state must not be negative, got {random_state}.")
+    return np.random.default_rng(int(random_state))
 
 
 def as_seed(random_state: RandomState) -> int:
-    """Return the integer that a ``random_state`` is or gives."""
-    if isinstance(random_state, int | np.integer):
-        as_generator(random_state)
-        return int(random_state)
-    return int(as_generator(random_state).integers(2**63))
+    """Return a ``random_state`` as an integer: itself if it is one, otherwise a draw from it."""
+    rng = as_generator(random_state)
+    return int(random_state) if is_integer(random_state) else int(rng.integers(2**63))
+
+
+def is_integer(value: Any) -> TypeGuard[int]:
+    """Say whether a value is an integer of Python or numpy; True and False are not."""
+    return isinstance(value, Integral) and not isinstance(value, bool)
+
+
+def is_number(value: Any) -> TypeGuard[float]:
+    """Say whether a value is a real number of Python or numpy; True and False are not."""
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def check_count(value: Any, name: str) -> None:
     """Raise ``ValueError`` unless a value is a positive integer."""
-    if not isinstance(value, int | np.integer) or isinstance(value, bool) or int(value) < 1:
+    if not is_integer(value) or value < 1:
         raise ValueError(f"{name} must be a positive integer, got {value!r}.")
 
 
 def check_number(value: Any, name: str, low: float, high: float) -> None:
-    """Raise ``ValueError`` unless a value is a number between two limits, both allowed."""
-    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    if not number or not low <= value <= high:
+    """Raise ``ValueError`` unless a value is a number from ``low`` to ``high``, both included."""
+    if not is_number(value) or not low <= value <= high:
         raise ValueError(f"{name} must be a number between {low} and {high}, got {value!r}.")
+
+
+def check_rows(rows: str, n_columns: int, *arrays: Any) -> None:
+    """Raise ``ValueError`` unless every array has shape (n, n_columns).
+
+    Parameters
+    ----------
+    rows : str
+        What a row is, for the message, such as "poses [x, y, θ]".
+    n_columns : int
+    *arrays : ndarray
+    """
+    for array in arrays:
+        if getattr(array, "ndim", 0) != 2 or array.shape[1] != n_columns:
+            raise ValueError(
+                f"Expected {rows} as an array of shape (n, {n_columns}), got {_described(array)}."
+            )
 
 
 def as_finite_array(
     values: ArrayLike, name: str, shape: tuple[int | None, ...]
 ) -> NDArray[np.float64]:
-    """Return ``values`` as a float64 array of the given shape, or say what is wrong with it.
+    """Return ``values`` as a float64 array, after checking its shape and that it is finite.
 
     Parameters
     ----------
@@ -71,17 +105,19 @@ def as_finite_array(
     name : str
         The argument's name, for the message.
     shape : tuple of int or None
-        Expected lengths; None takes any.
+        The length that each axis must have; None allows any.
+
+    Returns
+    -------
+    array : ndarray of float64
+        ``values`` itself if it is such an array.
 
     Raises
     ------
     ValueError
-        If the shape differs, or a value is NaN, infinite or no number.
+        If the shape differs, or if a value is NaN, infinite or not a real number.
     """
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must be an array of numbers, got {values!r}.") from error
+    array = _as_floats(values, name)
     fits = array.ndim == len(shape) and all(
         want is None or want == got for want, got in zip(shape, array.shape, strict=True)
     )
@@ -96,16 +132,41 @@ def as_finite_array(
 def check_within_bounds(
     configuration: NDArray[np.float64], bounds: NDArray[np.float64], name: str
 ) -> None:
-    """Raise ``ValueError`` if a configuration, (d,) or (m, d), leaves ``bounds``, (2, d)."""
+    """Raise ``ValueError`` unless a configuration lies within bounds.
+
+    Parameters
+    ----------
+    configuration : ndarray of shape (d,) or (n, d)
+        One configuration, or several as rows, all of which are checked.
+    bounds : ndarray of shape (2, d)
+        Lower limits, then upper limits; both are within.
+    name : str
+        The argument's name, for the message.
+    """
     low, high = bounds
     outside = np.atleast_2d((configuration < low) | (configuration > high)).any(axis=1)
     if outside.any():
-        worst = np.atleast_2d(configuration)[outside][0]
+        first = np.atleast_2d(configuration)[outside][0]
         raise ValueError(
             f"{name} must lie within the bounds {low.tolist()} to {high.tolist()}, "
-            f"got {worst.tolist()}."
+            f"got {first.tolist()}."
         )
+
+
+def _as_floats(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind in REAL_KINDS:
+            return np.asarray(array, dtype=np.float64)
+        complaint = None
+    except (TypeError, ValueError) as error:
+        complaint = error
+    raise ValueError(f"{name} must be an array of numbers, got {values!r}.") from complaint
 
 
 def _shortened(array: NDArray[Any]) -> str:
     return np.array2string(array, threshold=8, edgeitems=2, separator=", ")
+
+
+def _described(value: Any) -> str:
+    return f"the shape {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__

@@ -39,13 +39,13 @@ def test_shipped_scenes_keep_the_contract(scene):
     check_system(Car(scene))
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5, deadline=None, derandomize=True)
 @given(seeds)
 def test_random_scenes_keep_the_contract(seed):
     check_system(Car(random_car_scene(seed)), random_state=seed)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(seeds)
 def test_execution_never_leaves_the_free_space(seed):
     rng = np.random.default_rng(seed)
@@ -57,7 +57,7 @@ def test_execution_never_leaves_the_free_space(seed):
     assert (room[~completed] <= CONTACT + 1e-6).all()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(seeds)
 def test_rollouts_stay_free_and_end_on_the_boundary(seed):
     rng = np.random.default_rng(seed)
@@ -73,7 +73,7 @@ def test_rollouts_stay_free_and_end_on_the_boundary(seed):
         assert len(rollout.states) == 41
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50, deadline=None, derandomize=True)
 @given(seeds)
 def test_a_rollout_is_its_commands_one_by_one(seed):
     rng = np.random.default_rng(seed)
@@ -87,7 +87,7 @@ def test_a_rollout_is_its_commands_one_by_one(seed):
         assert completed[0] == (i < rollout.n_completed)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(
     turn=st.floats(-0.9, 0.9),
     share=st.floats(0.5, 1.0),
@@ -134,7 +134,7 @@ def test_standing_still_is_braking():
     assert end[0, 0] == pytest.approx(2.0**2 / (2 * 2.0), abs=0.02)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30, deadline=None, derandomize=True)
 @given(seeds)
 def test_model_agrees_with_looking_at_many_places_along_the_way(seed):
     rng = np.random.default_rng(seed)
@@ -176,7 +176,7 @@ def polygon_gap(points, corners):
     return np.where(outside, gap, -gap)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20, deadline=None, derandomize=True)
 @given(seeds)
 def test_clearance_is_that_of_a_slow_reference(seed):
     rng = np.random.default_rng(seed)
@@ -191,7 +191,7 @@ def test_clearance_is_that_of_a_slow_reference(seed):
             assert room < 0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20, deadline=None, derandomize=True)
 @given(seeds, st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3))
 def test_features_do_not_depend_on_where_the_car_is(seed, dx, dy, turn):
     """The whole world moved and turned gives the same rows."""
@@ -224,11 +224,55 @@ def test_distances_take_the_short_way_round():
     assert car.succeeded([0, 0, 3.1, 0, 0], other, 0.1)
 
 
+def test_the_pose_of_a_state_has_its_heading_in_range():
+    car = Car(NOTHING_NEAR)
+    state = np.array([1.0, 2.0, 4.0, 0.5, 0.1])
+    np.testing.assert_allclose(car.reduce(state), [1, 2, 4 - 2 * np.pi])
+    assert state[2] == 4.0
+    np.testing.assert_array_equal(car.reduce([1, 2, 3, 0, 0]), [1, 2, 3])
+
+
+def test_steering_is_one_step_at_most_towards_the_pose():
+    car = Car(NOTHING_NEAR)
+    near, far = np.array([[0.3, 0.4, -0.5]]), np.array([[3.0, 4.0, 0.0]])
+    np.testing.assert_array_equal(car.steer(np.zeros((1, 3)), near), near)
+    np.testing.assert_allclose(car.steer(np.zeros((1, 3)), far), far / 5)
+
+
+def test_close_and_goals_are_within_a_quarter_of_the_cars_length():
+    car = Car(NOTHING_NEAR)
+    poses = np.array([[0.149, 0, 0], [0.151, 0, 0], [0, 0.1, 0.12], [0, 0, -0.149]])
+    expected = [True, False, False, True]
+    assert car.close(poses, np.zeros((4, 3))).tolist() == expected
+    assert car.goal_reached(poses, np.array([[9.0, 9, 0], [0, 0, 0]])).tolist() == expected
+    assert car.succeeded([0.3, 0, 0, 1, 0], np.zeros((1, 3)), 0.31)
+    assert not car.succeeded([0.3, 0, 0, 1, 0], np.zeros((1, 3)), 0.29)
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(seeds)
+def test_random_scenes_are_lots_with_five_to_ten_obstacles(seed):
+    scene = random_car_scene(seed)
+    assert scene == random_car_scene(np.random.default_rng(seed))
+    assert scene.bounds == (0, 0, 8, 8)
+    assert 5 <= len(scene.obstacles) <= 10
+    for obstacle in scene.obstacles:
+        if isinstance(obstacle, Circle):
+            assert 0.2 <= obstacle.radius <= 0.7
+        else:
+            sides = np.diff(obstacle.corners, axis=0)
+            length, width = np.linalg.norm(sides[:2], axis=1)
+            assert 0.3 <= min(length, width) <= max(length, width) <= 2.0
+            assert np.dot(sides[0], sides[1]) == pytest.approx(0, abs=1e-9)
+
+
 def test_problems_start_free_with_time_to_stop():
     car = Car("slalom")
     for seed in range(50):
         problem = car.sample_problem(seed)
-        assert car.clearance(problem.goal)[0] > 0
+        assert car.clearance(problem.goal)[0] > 0.05
+        assert car.clearance(problem.start[None, :3])[0] > 0.05
+        assert 0 <= problem.start[3] <= 2
         assert car.execute(problem.start[None], np.zeros((1, 3)))[1][0]
 
 
@@ -248,10 +292,14 @@ def test_bad_input_is_named():
         Car("lot")
     with pytest.raises(ValueError, match="scene must be"):
         Car(3)
-    with pytest.raises(ValueError, match="radius"):
-        Circle(0, 0, -1)
-    with pytest.raises(ValueError, match="counter-clockwise"):
-        ConvexPolygon(((0, 0), (0, 1), (1, 0)))
+    for radius in (-1, 0, np.nan, np.inf, None, True):
+        with pytest.raises(ValueError, match=f"radius must be a positive number, got {radius}"):
+            Circle(0, 0, radius)
+    star = [(np.cos(a), np.sin(a)) for a in 0.8 * np.pi * np.arange(5)]
+    dented = ((0, 0), (1, 0), (0.2, 0.2), (0, 1))
+    for corners in (((0, 0), (0, 1), (1, 0)), ((0, 0), (1, 0)), star, dented):
+        with pytest.raises(ValueError, match="counter-clockwise"):
+            ConvexPolygon(corners)
     with pytest.raises(ValueError, match="bounds"):
         CarScene((), (1, 0, 0, 1))
     with pytest.raises(ValueError, match="obstacles"):
@@ -263,8 +311,15 @@ def test_bad_input_is_named():
         car.rollout([0, 0, 0], np.zeros((1, 3)))
     with pytest.raises(ValueError, match="commands"):
         car.rollout([1, 1, 0, 0, 0], np.zeros((1, 2)))
-    with pytest.raises(ValueError, match="shape"):
-        car.propagate(np.zeros(3), np.zeros(3))
+    for method in (car.propagate, car.steer, car.close, car.distance, car.features):
+        with pytest.raises(ValueError, match=r"poses .* of shape \(n, 3\), got the shape \(3,\)"):
+            method(np.zeros((1, 3)), np.zeros(3))
+    with pytest.raises(ValueError, match="poses"):
+        car.clearance([[0, 0, 0]])
+    with pytest.raises(ValueError, match="states must have the shape"):
+        car.execute([1, 1, 0, 0, 0], np.zeros((1, 3)))
+    with pytest.raises(ValueError, match=r"commands must have the shape \(1, 3\)"):
+        car.execute([[1, 1, 0, 0, 0]], np.zeros((2, 3)))
 
 
 def test_a_trace_passes_through_the_rollout():

@@ -1,15 +1,70 @@
 """check_system says what a user's system got wrong."""
 
+from enum import Enum
+
 import numpy as np
 import pytest
-from toy_systems import Disc, Odometer
+from toy_systems import Disc, Odometer, Turntable
 
-from systems import Rollout, StopReason, SystemContractError, check_system
+from systems import Problem, Rollout, StopReason, SystemContractError, check_system
 
 
-def test_systems_that_keep_the_contract_pass():
-    check_system(Disc())
-    check_system(Odometer())
+class PotholeReason(Enum):
+    POTHOLE = "The wheel is in a pothole."
+    NUMBERED = 3
+
+
+def stopping_with(reason):
+    """The rollout of a system that stops in its second command."""
+
+    def rollout(self, state, commands):
+        if len(commands) < 2:
+            return Disc.rollout(self, state, commands)
+        done = Disc.rollout(self, state, commands[:1])
+        return Rollout([*done.states, done.states[-1]], 1, reason)
+
+    return rollout
+
+
+def changed(base=Disc, **attributes):
+    """A system with some attributes and methods replaced, which pickles as the one it is from."""
+    return type("Changed", (base,), attributes | {"__reduce__": lambda self: (base, ())})()
+
+
+class NumpyAnswers(Disc):
+    """Whose attributes and answers are numpy's scalars."""
+
+    reduced_dim = np.int64(2)
+    configuration_dim = np.uint8(2)
+    step_size = np.float32(0.1)
+    bounds = np.array([[-1, -1], [1, 1]])
+
+    def succeeded(self, state, goal, tolerance):
+        return np.bool_(super().succeeded(state, goal, tolerance))
+
+
+class Walled(Disc):
+    """Whose model sees no way at all, so that there is nothing to execute."""
+
+    def propagate(self, reduced, command):
+        return np.full_like(reduced, np.nan), np.zeros(len(reduced), dtype=bool)
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        Disc(),
+        Odometer(),
+        Turntable(),
+        NumpyAnswers(),
+        Walled(),
+        changed(rollout=stopping_with(StopReason.CONSTRAINT)),
+        changed(rollout=stopping_with(PotholeReason.POTHOLE)),
+    ],
+)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_systems_that_keep_the_contract_pass(system, seed):
+    check_system(system, random_state=seed)
 
 
 class Unpicklable(Disc):
@@ -33,6 +88,13 @@ class Restless(Disc):
         return reduced + self.rng.normal(size=reduced.shape)
 
 
+class RestlessGoals(Restless):
+    features = Disc.features
+
+    def sample_problem(self, random_state=None):
+        return Problem(np.array([0.9, 0.9]), self.rng.uniform(size=(1, 2)))
+
+
 class OneByOne(Disc):
     def steer(self, reduced, configuration):
         return super().steer(reduced, configuration[:1])
@@ -53,18 +115,6 @@ class Imprecise(Disc):
         return 0.5 * super().steer(reduced, configuration)
 
 
-class Silent(Disc):
-    def rollout(self, state, commands):
-        rollout = super().rollout(state, commands)
-        return Rollout(rollout.states[1:], rollout.n_completed, rollout.stop_reason)
-
-
-class Optimist(Disc):
-    def rollout(self, state, commands):
-        rollout = super().rollout(state, commands)
-        return Rollout(rollout.states, rollout.n_completed, StopReason.CONSTRAINT)
-
-
 class Raising(Disc):
     def close(self, predicted, executed):
         raise KeyError("threshold")
@@ -80,50 +130,223 @@ class Narrow(Disc):
         return super().sample_configurations(rng, n)[:, :1]
 
 
-def changed(**attributes):
-    return type("Changed", (Disc,), attributes | {"__reduce__": lambda self: (Disc, ())})()
+class Silent(Disc):
+    def rollout(self, state, commands):
+        rollout = super().rollout(state, commands)
+        return Rollout(rollout.states[1:], rollout.n_completed, rollout.stop_reason)
+
+
+class Late(Disc):
+    """Whose rollout starts with the second state."""
+
+    def rollout(self, state, commands):
+        states = super().rollout(state, commands).states
+        states = [*states[1:], states[-1]]
+        return Rollout(states, len(commands), StopReason.COMPLETED)
+
+
+class Pessimist(Disc):
+    def rollout(self, state, commands):
+        rollout = super().rollout(state, commands)
+        return Rollout(rollout.states, rollout.n_completed, StopReason.CONSTRAINT)
+
+
+class Optimist(Disc):
+    def rollout(self, state, commands):
+        rollout = super().rollout(state, commands)
+        return Rollout(rollout.states[:1], 0, StopReason.COMPLETED)
+
+
+class Eager(Disc):
+    """Whose rollout moves without a command."""
+
+    def rollout(self, state, commands):
+        if len(commands):
+            return super().rollout(state, commands)
+        return Rollout([state, state], 0, StopReason.CONSTRAINT)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "message"),
+    [
+        ({"reduced_dim": 0}, "reduced_dim must be a positive integer, got 0"),
+        ({"reduced_dim": True}, "reduced_dim must be a positive integer, got True"),
+        ({"configuration_dim": 2.0}, "configuration_dim must be a positive integer, got 2.0"),
+        ({"configuration_dim": 3}, "configuration_dim must be at most reduced_dim = 2"),
+        ({"step_size": np.inf}, "step_size must be a positive number, got inf"),
+        ({"step_size": 0}, "step_size must be a positive number, got 0"),
+        ({"step_size": "1"}, "step_size must be a positive number, got '1'"),
+        ({"bounds": np.zeros((2, 3))}, r"bounds must be an array of shape \(2, 2\).*\(2, 3\)"),
+        ({"bounds": np.zeros((2, 2))}, "bounds must be finite, lower < upper"),
+        ({"bounds": np.array([[0, 0], [1, np.inf]])}, "bounds must be finite, lower < upper"),
+        ({"bounds": np.array([["0", "0"], ["1", "1"]])}, "bounds must be an array"),
+        ({"bounds": [[-1.0, -1.0], [1.0, 1.0]]}, r"bounds must be an array .* got \[\[-1.0"),
+        ({"bounds": None}, "bounds must be an array .* got None"),
+    ],
+)
+def test_wrong_attributes_are_named(attributes, message):
+    with pytest.raises(SystemContractError, match=rf"^Changed\.{message}"):
+        check_system(changed(**attributes))
+
+
+@pytest.mark.parametrize("angular", [[0], (2,), (-1,), (0, 0), (0.0,), (True,), 0])
+def test_wrong_indices_of_angles_are_named(angular):
+    with pytest.raises(SystemContractError, match="angular must be a tuple of different indices"):
+        check_system(changed(angular=angular))
+
+
+def test_angles_have_bounds_of_one_turn():
+    bounds = np.array([[-4.0, -1.0], [np.pi, 1.0]])
+    with pytest.raises(SystemContractError, match=r"bounds must lie in \[-π, π\] for angles, got"):
+        check_system(changed(Turntable, bounds=bounds))
+
+
+def test_angles_that_the_model_leaves_unwrapped_are_named():
+    def propagate(self, reduced, command):
+        return reduced + command, np.ones(len(reduced), dtype=bool)
+
+    with pytest.raises(SystemContractError, match=r"propagate must return angles in \[-π, π\)"):
+        check_system(changed(Turntable, propagate=propagate))
 
 
 @pytest.mark.parametrize(
     ("system", "message"),
     [
-        (changed(reduced_dim=0), "reduced_dim must be a positive integer, got 0"),
-        (changed(configuration_dim=3), "configuration_dim must be at most reduced_dim = 2"),
-        (changed(step_size=np.inf), "step_size must be a positive number, got inf"),
-        (changed(bounds=np.zeros((2, 3))), r"bounds must be an array of shape \(2, 2\)"),
-        (changed(bounds=np.zeros((2, 2))), "bounds must be finite, lower < upper"),
-        (changed(bounds=None), "bounds must be an array"),
+        (object(), "must be a subclass of System"),
+        (Unpicklable(), "does not pickle .* leave simulators"),
         (Wandering(), "sample_configurations must draw from nothing but the given"),
         (Narrow(), r"sample_configurations must return an array of shape \(16, 2\)"),
-        (Unpicklable(), "does not pickle .* leave simulators"),
-        (InPlace(), "propagate changed its arguments in place"),
-        (Restless(), "features gave two results for the same arguments"),
-        (OneByOne(), "steer gives other results for rows alone than in a batch"),
-        (BatchDependent(), "features gives other results for rows alone"),
-        (Overshooting(), "steer commanded a motion of 0.3, more than step_size = 0.1"),
-        (Imprecise(), "steer misses a configuration within one step"),
-        (Silent(), "rollout must return the start"),
-        (Optimist(), r"rollout completed \d of \d commands, which does not go with"),
-        (Raising(), "Raising.close raised KeyError: 'threshold'"),
-        (changed(close=lambda s, p, e: True), "close must return one bool per row"),
-        (changed(close=lambda s, p, e: np.zeros(len(p), bool)), "not close to itself"),
+        (
+            changed(sample_configurations=lambda s, r, n: r.uniform(1, 2, (n, 2))),
+            r"sample_configurations left the bounds: \[\[1.",
+        ),
+        (
+            changed(sample_configurations=lambda s, r: None),
+            "sample_configurations raised TypeError",
+        ),
+        (changed(sample_problem=lambda s, r: (0, 1)), "sample_problem must return a Problem"),
+        (RestlessGoals(), "sample_problem gave two results for the same arguments"),
         (changed(reduce=lambda s, x: x[:1]), r"reduce must return an array of shape \(2,\)"),
         (changed(reduce=lambda s, x: x * np.nan), "reduce returned NaN or infinity"),
         (changed(reduce=lambda s, x: np.float32(x)), "reduce must return a float64 array"),
-        (changed(sample_problem=lambda s, r: (0, 1)), "sample_problem must return a Problem"),
+        (changed(reduce=lambda s, x: [0.0, 0.0]), "reduce must return a float64 array, got list"),
+    ],
+)
+def test_breaches_of_attributes_and_drawing_are_named(system, message):
+    with pytest.raises(SystemContractError, match=message):
+        check_system(system)
+
+
+@pytest.mark.parametrize(
+    ("goal", "message"),
+    [
+        (np.zeros(2), r"a goal that is an array of shape \(n_goals, 2\), got array\(\[0., 0.\]\)"),
+        (np.zeros((1, 3)), "a goal that is an array of shape"),
+        (np.zeros((0, 2)), "a goal that is an array of shape"),
+        ([[0.0, 0.0]], "a goal that is an array of shape"),
+        (np.array([[0.0, 0.0], [0.0, 1.5]]), r"sample_problem returned a goal out of bounds: \[\["),
+    ],
+)
+def test_goals_are_configurations_within_bounds(goal, message):
+    problem = Problem(np.array([0.9, 0.9]), goal)
+    with pytest.raises(SystemContractError, match=message):
+        check_system(changed(sample_problem=lambda s, r: problem))
+
+
+@pytest.mark.parametrize(
+    ("system", "message"),
+    [
+        (changed(steer=lambda s, b, q: q[0]), r"steer must return one command per row.*got \(2,\)"),
+        (changed(steer=lambda s, b, q: q[:3]), r"steer must return one command per row.*\(3, 2\)"),
+        (changed(steer=lambda s, b, q: q.astype("f")), "steer must return a float64 array"),
+        (OneByOne(), "steer gives other results for rows alone than in a batch"),
+        (Overshooting(), "steer commanded a motion of 0.3, more than step_size = 0.1"),
+        (Imprecise(), "steer misses a configuration within one step"),
+        (InPlace(), "propagate changed its arguments in place"),
         (changed(propagate=lambda s, b, u: b + u), r"must return \(next_reduced, valid\)"),
+        (
+            changed(propagate=lambda s, b, u: ((b + u)[:, :1], np.ones(len(b), bool))),
+            r"propagate must return next_reduced of shape \(16, 2\), got \(16, 1\)",
+        ),
+        (
+            changed(propagate=lambda s, b, u: ((b + u).tolist(), np.ones(len(b), bool))),
+            "propagate must return next_reduced of shape",
+        ),
+        (
+            changed(propagate=lambda s, b, u: (b + u, np.ones(len(b)))),
+            r"propagate must return one bool per row, shape \(16,\), got float64 \(16,\)",
+        ),
+        (Raising(), "Raising.close raised KeyError: 'threshold'"),
+        (changed(close=lambda s, p, e: True), "close must return one bool per row.* got True"),
+        (changed(close=lambda s, p, e: np.zeros(len(p), bool)), "not close to itself"),
+        (Restless(), "features gave two results for the same arguments"),
+        (BatchDependent(), "features gives other results for rows alone"),
         (changed(features=lambda s, b, c: b[0]), "features must return a row per transition"),
         (changed(features=lambda s, b, c: b * np.inf), "features must return finite numbers"),
+        (changed(features=lambda s, b, c: b.astype(str)), "features must return finite numbers"),
         (
             changed(features=lambda s, b, c: np.array(list(b))),
             r"features of no transitions must return an array of shape \(0, 2\), got \(0,\)",
         ),
+    ],
+)
+def test_breaches_of_the_model_are_named(system, message):
+    with pytest.raises(SystemContractError, match=message):
+        check_system(system)
+
+
+def test_walking_needs_a_model_that_carries_on():
+    """The rest of the reduced state may change with every step, but is checked as well."""
+
+    def propagate(self, reduced, command):
+        following, valid = Odometer.propagate(self, reduced, command)
+        return following * [1, 1, np.inf], valid
+
+    with pytest.raises(SystemContractError, match="propagate returned NaN or infinity"):
+        check_system(changed(Odometer, propagate=propagate))
+
+
+@pytest.mark.parametrize(
+    ("system", "message"),
+    [
+        (changed(rollout=lambda s, x, u: [x]), "rollout must return a Rollout, got"),
+        (changed(rollout=stopping_with("a pothole")), "stop_reason that is .* got 'a pothole'"),
+        (changed(rollout=stopping_with(PotholeReason.NUMBERED)), "whose value is a sentence, got"),
+        (
+            Pessimist(),
+            r"rollout completed (\d) of \1 commands, which .* stop reason CONSTRAINT",
+        ),
+        (Optimist(), r"rollout completed 0 of \d commands, which .* stop reason COMPLETED"),
+        (Silent(), r"rollout must return the start, one state per .*: \d states, got \d"),
+        (Late(), "rollout must return the start state first"),
+        (Eager(), "rollout of no commands must return the start state alone"),
         (changed(goal_reached=lambda s, b, g: 0), "goal_reached must return one bool per row"),
         (changed(succeeded=lambda s, x, g, t: False), "succeeded says False at an infinite"),
         (changed(succeeded=lambda s, x, g, t: None), "succeeded must return a bool, got None"),
-        (object(), "must be a subclass of System"),
     ],
 )
-def test_breaches_are_named(system, message):
+def test_breaches_of_the_execution_are_named(system, message):
     with pytest.raises(SystemContractError, match=message):
         check_system(system)
+
+
+def test_every_executed_state_must_reduce():
+    def rollout(self, state, commands):
+        done = Disc.rollout(self, state, commands)
+        states = [*done.states[:-1], np.full(2, np.nan)] if len(commands) else done.states
+        return Rollout(states, done.n_completed, done.stop_reason)
+
+    with pytest.raises(SystemContractError, match="reduce returned NaN or infinity"):
+        check_system(changed(rollout=rollout))
+
+
+def test_rollouts_must_repeat():
+    rng = np.random.default_rng(0)
+
+    def rollout(self, state, commands):
+        done = Disc.rollout(self, state, commands)
+        states = [done.states[0], *(s + rng.normal(size=2) for s in done.states[1:])]
+        return Rollout(states, done.n_completed, done.stop_reason)
+
+    with pytest.raises(SystemContractError, match="rollout gave two results"):
+        check_system(changed(rollout=rollout))

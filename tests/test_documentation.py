@@ -75,7 +75,7 @@ def test_no_import_runs_back_up_the_road(package):
         (
             "mujoco",
             {
-                "systems/planar_arm/planar_arm.py",
+                "systems/planar_arm/simulation.py",
                 "systems/rope/renderer.py",
                 "systems/rope/simulation/mujoco_engine.py",
             },

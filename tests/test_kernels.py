@@ -54,7 +54,7 @@ def plain_split(start, end, step):
 
 
 @given(points, points, st.floats(0.05, 2))
-@settings(deadline=None)
+@settings(deadline=None, derandomize=True)
 def test_edges_are_split_as_one_by_one(starts, ends, step):
     origins, targets, edge = split_edges(starts, ends, step)
     for i in range(3):
@@ -65,7 +65,7 @@ def test_edges_are_split_as_one_by_one(starts, ends, step):
 
 
 @given(points, points)
-@settings(deadline=None)
+@settings(deadline=None, derandomize=True)
 def test_nearest_agrees_with_a_distance_matrix(rows, queries):
     distances = ((rows[None, :, :2] - queries[:, None, :2]) ** 2).sum(axis=2)
     nearest = nearest_rows(rows, 3, 2, queries[:, :2].copy())
@@ -73,7 +73,7 @@ def test_nearest_agrees_with_a_distance_matrix(rows, queries):
 
 
 @given(points, points)
-@settings(deadline=None)
+@settings(deadline=None, derandomize=True)
 def test_limited_targets_agree_with_vector_arithmetic(current, target):
     way = target - current
     length = np.linalg.norm(way, axis=1, keepdims=True)
@@ -82,7 +82,7 @@ def test_limited_targets_agree_with_vector_arithmetic(current, target):
 
 
 @given(points, points)
-@settings(deadline=None)
+@settings(deadline=None, derandomize=True)
 def test_arm_features_agree_with_array_arithmetic(current, following):
     angles = np.cumsum(current, axis=1)
     motion = (following - current) / 0.1
@@ -91,7 +91,7 @@ def test_arm_features_agree_with_array_arithmetic(current, following):
 
 
 @given(points, points)
-@settings(deadline=None)
+@settings(deadline=None, derandomize=True)
 def test_rope_length_is_that_of_its_edges(grippers, nodes):
     line = np.vstack([grippers[0], nodes, grippers[1]])
     expected = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from systems import Problem, Rollout, SimulationDivergedError, StopReason, System
+from systems.angles import shortest_way, wrap_columns
 from systems.validation import as_generator
 
 
@@ -89,6 +90,27 @@ class Odometer(Disc):
 
     def close(self, predicted, executed):
         return np.linalg.norm((predicted - executed)[:, :2], axis=1) < 0.04
+
+
+class Turntable(Disc):
+    """A table that turns and slides along a rail; its problems start near the angle π."""
+
+    bounds = np.array([[-np.pi, -1.0], [np.pi, 1.0]])
+    angular = (0,)
+
+    def propagate(self, reduced, command):
+        return wrap_columns(reduced + command, self.angular), np.ones(len(reduced), dtype=bool)
+
+    def steer(self, reduced, configuration):
+        return super().steer(np.zeros_like(reduced), shortest_way(reduced, configuration, (0,)))
+
+    def rollout(self, state, commands):
+        states = np.vstack([state, state + np.cumsum(commands, axis=0)])
+        return Rollout(wrap_columns(states, self.angular), len(commands), StopReason.COMPLETED)
+
+    def sample_problem(self, random_state=None):
+        rng = as_generator(random_state)
+        return Problem(np.array([np.pi - 0.01, rng.uniform(-1, 1)]), rng.uniform(-1, 1, (1, 2)))
 
 
 class Unstable(Disc):

@@ -1,1 +1,1 @@
-"""The paper's car, planned for as if it could move in any direction."""
+"""A car, planned for as if it could move in any direction (the paper's illustrative example)."""

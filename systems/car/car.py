@@ -1,4 +1,4 @@
-"""The paper's illustrative system: a car that is planned for as if it could move any way."""
+"""The system of the paper's illustrative example: a car in a lot with obstacles."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from systems.angles import shortest_way
+from systems.angles import shortest_way, wrap_columns
 from systems.car.dynamics import (
     LONGEST_COMMAND,
     MAX_SPEED,
@@ -20,12 +20,14 @@ from systems.car.features import transition_features
 from systems.car.geometry import clearances, limited_ways, straight_moves
 from systems.car.scenes import SCENES, CarScene, pack_scene
 from systems.system import Array, Problem, Rollout, StopReason, System
-from systems.validation import RandomState, as_finite_array, as_generator
+from systems.validation import RandomState, as_finite_array, as_generator, check_rows
 
 STEP_SIZE = 1.0
 CLOSE_DISTANCE = 0.15
 GOAL_DISTANCE = CLOSE_DISTANCE
+# The least clearance of the starts and goals that are drawn, in metres.
 ROOM_AT_ENDS = 0.05
+ROWS = "poses or displacements [x, y, θ]"
 
 
 class Car(System):
@@ -33,19 +35,21 @@ class Car(System):
 
     The true state is [x, y, θ, v, φ]: the middle of the rear axle (metres), the heading
     (radians, [-π, π)), the speed (m/s, negative in reverse) and the steering angle (radians).
-    The reduced state is the pose [x, y, θ], a command a displacement [Δx, Δy, Δθ] of it in the
-    scene's frame, and g(b, u) = b + u wherever the footprint touches nothing on the straight
-    way. The footprint is everything within 0.15 m of the 0.3 m between the axles. Distances
-    between poses count a radian as a metre and angles the short way round.
+    The reduced state is the pose [x, y, θ]. A command is a displacement [Δx, Δy, Δθ] of the pose
+    in the scene's frame, and g(b, u) = b + u is valid if the car touches nothing while its pose
+    changes in proportion from b to b + u. The car's footprint is everything within 0.15 m of the
+    segment of 0.3 m between its axles. Distances between poses count a radian as a metre, and
+    angles by the shorter way around the circle.
 
-    The true car accelerates by 2 m/s² at most, turns its wheels by 6 rad/s up to 0.55 rad, and
-    has grip for 2 m/s² across. Γ steers it towards the pose that it is at plus the displacement,
-    forwards or backwards, whichever way the displacement points, at 1.2 m/s or what the bend
-    allows, and means to be at 0.3 m/s at its target. It ends where the car passes the target, at
-    whatever speed it then has, or after 4 s, and the next command begins at that speed.
+    The true car accelerates and brakes by 2 m/s² at most, turns its wheels at 6 rad/s up to
+    0.55 rad, and slides if it would need more than 2 m/s² across. Γ drives it to the pose where it
+    is plus the displacement, forwards or backwards as the displacement points, at 1.2 m/s or
+    slower in curves, and slows down to 0.3 m/s at the target. A command ends when the car passes
+    the target, or after 4 s; the next command starts with the speed that the car then has.
 
-    Two poses are Close less than 0.15 m apart: a quarter of the car's length, so that a command
-    to go sideways is Unreliable at once, and a plan's small errors are not.
+    Two poses are Close if they are less than 0.15 (m, rad) apart. That is a quarter of the car's
+    length: less than a command to go sideways misses its target by, and more than the small
+    errors of commands that the car can follow.
 
     Parameters
     ----------
@@ -96,21 +100,21 @@ class Car(System):
         self.bounds = np.array([[x_min, y_min, -np.pi], [x_max, y_max, np.pi]])
 
     def reduce(self, state: Any) -> Array:
-        """Return the pose of a true state: r."""
-        return as_finite_array(state, "state", (5,))[:3].copy()
+        """Return the pose of a true state, its heading in [-π, π): r."""
+        return wrap_columns(as_finite_array(state, "state", (5,))[:3], self.angular)
 
     def propagate(self, reduced: Array, command: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Predict b + u, valid where the footprint touches nothing on the straight way: g."""
-        _check_rows(reduced, command)
-        return straight_moves(reduced, command, *self._packed)
+        """Predict b + u, valid if the car touches nothing on the way: g."""
+        check_rows(ROWS, 3, reduced, command)
+        return straight_moves(reduced, command, self._packed)
 
     def steer(self, reduced: Array, configuration: Array) -> Array:
-        """Return the displacement of at most one step towards a pose, the short way round."""
-        _check_rows(reduced, configuration)
+        """Return the displacement towards a pose, at most one step long."""
+        check_rows(ROWS, 3, reduced, configuration)
         return limited_ways(reduced, configuration, self.step_size)
 
     def rollout(self, state: Any, commands: ArrayLike) -> Rollout:
-        """Drive one displacement after the other: Γ.
+        """Drive displacements one after the other: Γ.
 
         Parameters
         ----------
@@ -120,25 +124,25 @@ class Car(System):
         Returns
         -------
         Rollout
-            ``states`` is an ndarray of shape (n, 5). A state at a boundary is a millimetre away
-            from it and has the speed at which the car got there.
+            ``states`` is an ndarray of shape (n, 5). If the car came to an obstacle or a wall, the
+            last state is a millimetre away from it, at the speed with which the car came.
 
         Raises
         ------
         ValueError
-            If the state or a command has the wrong shape or is not finite, or the car touches
-            something at its start.
+            If the state or a command has the wrong shape or is not finite, or if the car touches
+            something at the start.
         """
         start = self._checked_states(as_finite_array(state, "state", (5,))[None])[0]
         moves = as_finite_array(commands, "commands", (None, 3))
         states = np.empty((len(moves) + 1, 5))
-        n_completed = execute_commands(start, moves, *self._packed, states)
+        n_completed = execute_commands(start, moves, self._packed, states)
         completed = n_completed == len(moves)
         reason = StopReason.COMPLETED if completed else StopReason.CONSTRAINT
         return Rollout(states[: n_completed + (1 if completed else 2)], n_completed, reason)
 
     def execute(self, states: ArrayLike, commands: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
-        """Carry out one command from each state: Γ, row by row.
+        """Drive one displacement from each of many states: Γ.
 
         Parameters
         ----------
@@ -149,7 +153,7 @@ class Car(System):
         -------
         next_states : ndarray of shape (n, 5)
         completed : ndarray of bool of shape (n,)
-            False where the car came to a boundary.
+            False where the car came to an obstacle or a wall.
 
         Raises
         ------
@@ -158,36 +162,69 @@ class Car(System):
         """
         starts = self._checked_states(as_finite_array(states, "states", (None, 5)))
         moves = as_finite_array(commands, "commands", (len(starts), 3))
-        return execute_rows(starts, moves, *self._packed)
+        return execute_rows(starts, moves, self._packed)
 
     def trace(self, state: ArrayLike, commands: ArrayLike) -> Array:
-        """Return the states of a rollout every 0.01 s, shape (n, 5), for pictures."""
+        """Return the states of a rollout every 0.01 s, for pictures.
+
+        Parameters
+        ----------
+        state : ndarray of shape (5,)
+        commands : ndarray of shape (T, 3)
+
+        Returns
+        -------
+        states : ndarray of shape (n, 5)
+        """
         start = self._checked_states(as_finite_array(state, "state", (5,))[None])[0]
         moves = as_finite_array(commands, "commands", (None, 3))
         states = np.empty((1 + len(moves) * (1 + round(LONGEST_COMMAND / TIME_STEP)), 5))
-        return states[: trace_commands(start, moves, *self._packed, states)]
+        return states[: trace_commands(start, moves, self._packed, states)]
 
     def close(self, predicted: Array, executed: Array) -> NDArray[np.bool_]:
-        """Say whether poses are less than α = 0.15 (m, rad) apart: Close."""
+        """Say for each row whether two poses are less than α = 0.15 (m, rad) apart: Close."""
         return self.distance(predicted, executed) < CLOSE_DISTANCE
 
     def distance(self, one: Array, other: Array) -> Array:
-        """Return the distances between poses, (n, 3), with angles the short way round."""
-        _check_rows(one, other)
+        """Return the distance between the two poses of each row (m, rad).
+
+        Parameters
+        ----------
+        one, other : ndarray of shape (n, 3)
+
+        Returns
+        -------
+        distance : ndarray of shape (n,)
+        """
+        check_rows(ROWS, 3, one, other)
         return np.linalg.norm(shortest_way(one, other, self.angular), axis=1)
 
     def clearance(self, poses: Array) -> Array:
-        """Return how far the footprint is from everything at each pose, in metres."""
-        _check_rows(poses)
-        return clearances(poses, *self._packed)
+        """Return the footprint's distance from obstacles and walls, negative inside them.
+
+        Parameters
+        ----------
+        poses : ndarray of shape (n, 3)
+
+        Returns
+        -------
+        clearance : ndarray of shape (n,)
+            In metres.
+        """
+        check_rows(ROWS, 3, poses)
+        return clearances(poses, self._packed)
 
     def features(self, reduced: Array, next_reduced: Array) -> Array:
-        """Return (n, 37) rows: the displacement and what is near, in the car's frame."""
-        _check_rows(reduced, next_reduced)
-        return transition_features(reduced, next_reduced, *self._packed)
+        """Return the displacement and what is near, in the car's frame, as (n, 37) numbers.
+
+        They do not depend on where in the scene the car is, so that an estimator serves any scene.
+        See :func:`systems.car.features.transition_features` for the columns.
+        """
+        check_rows(ROWS, 3, reduced, next_reduced)
+        return transition_features(reduced, next_reduced, self._packed)
 
     def sample_problem(self, random_state: RandomState = None) -> Problem:
-        """Draw a pose to go to, and a start at up to 2 m/s from which the car can still stop."""
+        """Draw a goal pose, and a start at up to 2 m/s from which the car can brake in time."""
         rng = as_generator(random_state)
         while True:
             pose = self._draw_free_pose(rng)
@@ -196,8 +233,8 @@ class Car(System):
                 return Problem(start, self._draw_free_pose(rng)[None])
 
     def goal_reached(self, reduced: Array, goal: Array) -> NDArray[np.bool_]:
-        """Say, row by row, whether a pose is Close to one of the goal's: Goal_B."""
-        _check_rows(reduced, goal)
+        """Say for each row whether a pose is Close to one of the goal's: Goal_B."""
+        check_rows(ROWS, 3, reduced, goal)
         gaps = shortest_way(reduced[:, None], goal[None], self.angular)
         return (np.linalg.norm(gaps, axis=2) < GOAL_DISTANCE).any(axis=1)
 
@@ -214,16 +251,7 @@ class Car(System):
                 return pose
 
     def _checked_states(self, states: Array) -> Array:
-        inside = clearances(states[:, :3], *self._packed) <= 0
+        inside = clearances(states[:, :3], self._packed) <= 0
         if inside.any():
             raise ValueError(f"The car must not touch anything, and does at {states[inside][0]}.")
         return states
-
-
-def _check_rows(*arrays: Array) -> None:
-    for array in arrays:
-        if getattr(array, "ndim", 0) != 2 or array.shape[1] != 3:
-            raise ValueError(
-                "Poses and displacements must be rows of x, y and θ, an array of shape (n, 3), "
-                f"got {np.shape(array)}."
-            )

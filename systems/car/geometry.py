@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,9 +14,42 @@ Array = NDArray[np.float64]
 
 WHEELBASE = 0.3
 CAR_RADIUS = 0.15
-# Closer than this counts as touching: between two instants of 0.01 s the rounded car can cut a
-# corner by half of it at most.
+# A clearance below this counts as contact. Clearance is checked every 0.01 s of a drive, and
+# between two checks the footprint can enter an obstacle's corner by half of this at most.
 CONTACT = 1e-3
+# Rounding of a displacement that was shortened to one step.
+STEP_ALLOWANCE = 1 + 1e-9
+
+
+class PackedScene(NamedTuple):
+    """A scene as arrays, for compiled code.
+
+    Every obstacle is a convex polygon, grown by a radius: a circle is a polygon of one corner.
+
+    Attributes
+    ----------
+    bounding_circles : ndarray of shape (n_obstacles, 3)
+        x, y and radius of a circle that contains the obstacle.
+    corners : ndarray of shape (n_obstacles, most_corners, 2)
+        x and y of each polygon's corners, counter-clockwise, padded with zeros.
+    n_corners : ndarray of int of shape (n_obstacles,)
+    grown_by : ndarray of shape (n_obstacles,)
+        The radius that each polygon is grown by.
+    walls : tuple of float
+        x_min, y_min, x_max, y_max.
+    """
+
+    bounding_circles: Array
+    corners: Array
+    n_corners: NDArray[np.int64]
+    grown_by: Array
+    walls: tuple[float, float, float, float]
+
+
+@compiled
+def clipped(value: float, limit: float) -> float:
+    """Return a value limited to [-limit, limit]."""
+    return max(-limit, min(limit, value))
 
 
 @compiled
@@ -35,6 +70,7 @@ def point_segment_squared(
 def _crossing(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
 ) -> bool:
+    """Say whether the segments from a to b and from c to d cross."""
     one = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     two = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
     three = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
@@ -59,7 +95,8 @@ def polygon_distance(
     Returns
     -------
     distance : float
-        Where the segment's first end is inside, minus that end's depth; where it only crosses, 0.
+        Negative if the segment's first end is inside the polygon: then how deep that end is.
+        0 if the segment only crosses the polygon.
     """
     squared = np.inf
     outside = -np.inf
@@ -81,73 +118,76 @@ def polygon_distance(
 
 
 @compiled
-def scene_distance(
-    ax: float, ay: float, bx: float, by: float, hulls: Array, corners: Array, walls: Array
-) -> float:
+def scene_distance(ax: float, ay: float, bx: float, by: float, scene: PackedScene) -> float:
     """Return the signed distance of a segment from the nearest obstacle or wall."""
+    x_min, y_min, x_max, y_max = scene.walls
     nearest = min(
-        min(min(ax, bx) - walls[0], walls[2] - max(ax, bx)),
-        min(min(ay, by) - walls[1], walls[3] - max(ay, by)),
+        min(min(ax, bx) - x_min, x_max - max(ax, bx)),
+        min(min(ay, by) - y_min, y_max - max(ay, by)),
     )
-    for i in range(hulls.shape[0]):
-        apart = point_segment_squared(hulls[i, 0], hulls[i, 1], ax, ay, bx, by)
-        reach = nearest + hulls[i, 2]
+    for i in range(scene.corners.shape[0]):
+        x, y, radius = scene.bounding_circles[i]
+        apart = point_segment_squared(x, y, ax, ay, bx, by)
+        reach = nearest + radius
         if reach > 0 and apart > reach * reach:
             continue
-        distance = polygon_distance(ax, ay, bx, by, corners[i], int(hulls[i, 4])) - hulls[i, 3]
-        nearest = min(nearest, distance)
+        distance = polygon_distance(ax, ay, bx, by, scene.corners[i], scene.n_corners[i])
+        nearest = min(nearest, distance - scene.grown_by[i])
     return nearest
 
 
 @compiled
-def clearance(
-    x: float, y: float, heading: float, hulls: Array, corners: Array, walls: Array
-) -> float:
-    """Return how far the car's footprint is from touching anything; negative inside."""
+def clearance(x: float, y: float, heading: float, scene: PackedScene) -> float:
+    """Return the distance of the car's footprint from obstacles and walls; negative inside."""
     front_x, front_y = x + WHEELBASE * np.cos(heading), y + WHEELBASE * np.sin(heading)
-    return scene_distance(x, y, front_x, front_y, hulls, corners, walls) - CAR_RADIUS
+    return scene_distance(x, y, front_x, front_y, scene) - CAR_RADIUS
 
 
 @compiled
-def clearances(poses: Array, hulls: Array, corners: Array, walls: Array) -> Array:
+def clearances(poses: Array, scene: PackedScene) -> Array:
     """Return the clearance of each pose, (n, 3)."""
     distances = np.empty(poses.shape[0])
     for row in range(poses.shape[0]):
-        x, y, heading = poses[row, 0], poses[row, 1], poses[row, 2]
-        distances[row] = clearance(x, y, heading, hulls, corners, walls)
+        distances[row] = clearance(poses[row, 0], poses[row, 1], poses[row, 2], scene)
     return distances
 
 
 @compiled
 def limited_ways(poses: Array, targets: Array, step_size: float) -> Array:
-    """Return the displacements towards poses, the short way round and of at most one step.
+    """Return displacements towards target poses, at most one step long.
 
     Parameters
     ----------
     poses, targets : ndarray of shape (n, 3)
+        x, y, θ; headings differ by the shorter way around the circle.
     step_size : float
+
+    Returns
+    -------
+    ways : ndarray of shape (n, 3)
     """
     ways = targets - poses
     for row in range(ways.shape[0]):
         ways[row, 2] = wrap_angle(ways[row, 2])
         length = np.sqrt(ways[row, 0] ** 2 + ways[row, 1] ** 2 + ways[row, 2] ** 2)
-        # The allowance lets transitions that were cut to one step arrive exactly.
-        if length > step_size * (1 + 1e-9):
+        if length > step_size * STEP_ALLOWANCE:
             ways[row] *= step_size / length
     return ways
 
 
 @compiled
 def straight_moves(
-    poses: Array, moves: Array, hulls: Array, corners: Array, walls: Array
+    poses: Array, moves: Array, scene: PackedScene
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Add displacements to poses, and tell whether the footprint touches nothing on the way.
+    """Add displacements to poses, and check that the footprint touches nothing on the way.
 
-    Advances by as much as the clearance allows, so nothing is missed between samples.
+    Along a displacement, position and heading change in proportion. Each check is followed by the
+    longest motion that the clearance there allows, so that no contact is missed in between.
 
     Parameters
     ----------
     poses, moves : ndarray of shape (n, 3)
+    scene : PackedScene
 
     Returns
     -------
@@ -162,17 +202,19 @@ def straight_moves(
         ends[row, 0] = poses[row, 0] + dx
         ends[row, 1] = poses[row, 1] + dy
         ends[row, 2] = wrap_angle(poses[row, 2] + turn)
+        # No point of the footprint moves further than this.
         motion = np.sqrt(dx * dx + dy * dy) + WHEELBASE * abs(turn)
         along = 0.0
         free[row] = True
         while True:
             x, y = poses[row, 0] + along * dx, poses[row, 1] + along * dy
-            room = clearance(x, y, poses[row, 2] + along * turn, hulls, corners, walls)
+            room = clearance(x, y, poses[row, 2] + along * turn, scene)
             if not room >= CONTACT:
                 free[row] = False
                 break
             if along >= 1 or room >= CONTACT + (1 - along) * motion:
                 break
-            # A tenth of the contact distance keeps the advance from stalling at a wall.
+            # A tenth of the contact distance is added, so that near a wall the advance never
+            # shrinks to nothing.
             along = min(1.0, along + (room - 0.9 * CONTACT) / motion)
     return ends, free

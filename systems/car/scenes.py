@@ -1,4 +1,4 @@
-"""Scenes that the car drives in: obstacles in a walled lot, as data."""
+"""Scenes that the car drives in: walled lots with obstacles."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from systems.system import Array
-from systems.validation import RandomState, as_finite_array, as_generator
+from systems.car.geometry import PackedScene
+from systems.validation import RandomState, as_finite_array, as_generator, is_number
 
 LOT_SIZE = 8.0
 MIN_OBSTACLES, MAX_OBSTACLES = 5, 10
@@ -31,8 +31,8 @@ class Circle:
 
     def __post_init__(self) -> None:
         as_finite_array([self.x, self.y], "centre", (2,))
-        if not 0 < self.radius < np.inf:
-            raise ValueError(f"radius must be positive, got {self.radius!r}.")
+        if not is_number(self.radius) or not 0 < self.radius < np.inf:
+            raise ValueError(f"radius must be a positive number, got {self.radius!r}.")
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class ConvexPolygon:
         following = np.roll(sides, -1, axis=0)
         turns = sides[:, 0] * following[:, 1] - sides[:, 1] * following[:, 0]
         angles = np.arctan2(turns, np.sum(sides * following, axis=1))
-        # More than one turn in all is a star, whose corners are all convex.
+        # The corners of a star all turn the same way too, but by more than 2π in all.
         if len(corners) < 3 or (turns <= 0).any() or angles.sum() > 3 * np.pi:
             raise ValueError(
                 "corners must be those of a convex polygon, three or more, counter-clockwise, "
@@ -85,7 +85,7 @@ class CarScene:
 
 
 def rectangle(x: float, y: float, length: float, width: float, angle: float = 0.0) -> ConvexPolygon:
-    """Return a rectangle around (x, y) whose length points along ``angle`` (radians)."""
+    """Return a rectangle with its centre at (x, y), its length along ``angle`` (radians)."""
     half = 0.5 * np.array([[-length, -width], [length, -width], [length, width], [-length, width]])
     cosine, sine = np.cos(angle), np.sin(angle)
     corners = half @ np.array([[cosine, sine], [-sine, cosine]]) + [x, y]
@@ -93,7 +93,16 @@ def rectangle(x: float, y: float, length: float, width: float, angle: float = 0.
 
 
 def random_car_scene(random_state: RandomState = None) -> CarScene:
-    """Draw a lot of 8 m by 8 m with 5 to 10 circles and rectangles anywhere in it."""
+    """Draw a lot of 8 m by 8 m with 5 to 10 circles and rectangles anywhere in it.
+
+    Parameters
+    ----------
+    random_state : None, int, SeedSequence, Generator or RandomState
+
+    Returns
+    -------
+    scene : CarScene
+    """
     rng = as_generator(random_state)
     obstacles: list[Circle | ConvexPolygon] = []
     for _ in range(rng.integers(MIN_OBSTACLES, MAX_OBSTACLES + 1)):
@@ -107,33 +116,25 @@ def random_car_scene(random_state: RandomState = None) -> CarScene:
     return CarScene(tuple(obstacles))
 
 
-def pack_scene(scene: CarScene) -> tuple[Array, Array, Array]:
-    """Lay a scene out for compiled code.
-
-    A circle is a polygon of one corner, grown by its radius.
-
-    Returns
-    -------
-    hulls : ndarray of shape (n_obstacles, 5)
-        Centre and radius of a circle around the obstacle, the radius that its polygon is grown
-        by, and the number of its corners.
-    corners : ndarray of shape (n_obstacles, most_corners, 2)
-        Padded with zeros.
-    walls : ndarray of shape (4,)
-    """
-    counts = [1 if isinstance(o, Circle) else len(o.corners) for o in scene.obstacles]
-    hulls = np.zeros((len(counts), 5))
-    corners = np.zeros((len(counts), max(counts, default=1), 2))
+def pack_scene(scene: CarScene) -> PackedScene:
+    """Return a scene as arrays for compiled code."""
+    n_corners = np.array([1 if isinstance(o, Circle) else len(o.corners) for o in scene.obstacles])
+    bounding_circles = np.zeros((len(n_corners), 3))
+    corners = np.zeros((len(n_corners), max(n_corners, default=1), 2))
+    grown_by = np.zeros(len(n_corners))
     for i, obstacle in enumerate(scene.obstacles):
         if isinstance(obstacle, Circle):
+            bounding_circles[i] = obstacle.x, obstacle.y, obstacle.radius
             corners[i, 0] = obstacle.x, obstacle.y
-            hulls[i] = obstacle.x, obstacle.y, obstacle.radius, obstacle.radius, 1
+            grown_by[i] = obstacle.radius
         else:
             own = np.array(obstacle.corners)
-            corners[i, : len(own)] = own
             centre = own.mean(axis=0)
-            hulls[i] = *centre, np.linalg.norm(own - centre, axis=1).max(), 0.0, len(own)
-    return hulls, corners, np.array(scene.bounds, dtype=np.float64)
+            bounding_circles[i] = *centre, np.linalg.norm(own - centre, axis=1).max()
+            corners[i, : len(own)] = own
+    x_min, y_min, x_max, y_max = map(float, scene.bounds)
+    walls = x_min, y_min, x_max, y_max
+    return PackedScene(bounding_circles, corners, n_corners.astype(np.int64), grown_by, walls)
 
 
 SCENES = {

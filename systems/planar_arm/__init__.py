@@ -1,1 +1,1 @@
-"""The paper's torque-limited planar arm."""
+"""The planar arm of the paper, whose first joint is too weak to hold it out straight."""

@@ -1,4 +1,4 @@
-"""Compiled inner loops of the planar arm."""
+"""Compiled steering and features of the planar arm."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from systems.compilation import compiled
 
 Array = NDArray[np.float64]
+# Rounding of a motion that was shortened to one step.
+STEP_ALLOWANCE = 1 + 1e-9
 
 
 @compiled
@@ -22,15 +24,14 @@ def limited_targets(current: Array, target: Array, step_size: float) -> Array:
     Returns
     -------
     limited : ndarray of shape (n, 3)
-        The target itself where it is within one step.
+        Equal to the target where that is within one step.
     """
     limited = target.copy()
     for row in range(current.shape[0]):
         squared = 0.0
         for i in range(3):
             squared += (target[row, i] - current[row, i]) ** 2
-        # The allowance lets transitions that were cut to one step arrive exactly.
-        if squared > (step_size * (1 + 1e-9)) ** 2:
+        if squared > (step_size * STEP_ALLOWANCE) ** 2:
             scale = step_size / np.sqrt(squared)
             for i in range(3):
                 limited[row, i] = current[row, i] + scale * (target[row, i] - current[row, i])
@@ -39,7 +40,7 @@ def limited_targets(current: Array, target: Array, step_size: float) -> Array:
 
 @compiled
 def transition_features(current: Array, following: Array, step_size: float) -> Array:
-    """Describe transitions by configuration, link directions and direction of motion.
+    """Describe transitions by joint angles, directions of the links, and motion.
 
     Parameters
     ----------
@@ -49,8 +50,8 @@ def transition_features(current: Array, following: Array, step_size: float) -> A
     Returns
     -------
     X : ndarray of shape (n, 12)
-        The three joint angles, sine and cosine of the three links' absolute angles, and the
-        motion in steps.
+        Three joint angles before the motion; the sines, then the cosines, of the three links'
+        angles from the x axis; and the change of the joint angles, in units of one step.
     """
     features = np.empty((current.shape[0], 12))
     for row in range(current.shape[0]):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from enum import Enum
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,6 +17,7 @@ from systems.rope.scene import GRIPPER_RADIUS, Scene
 from systems.rope.simulation.mujoco_engine import MujocoRope
 from systems.rope.simulation.pybullet_engine import PybulletRope
 from systems.rope.simulation.state import RopeState
+from systems.rope.simulation.stop_reason import RopeStopReason
 from systems.system import Rollout, StopReason
 from systems.validation import as_finite_array
 
@@ -143,16 +145,16 @@ class RopeRollout:
                 return Rollout(states, len(states) - 2, stop_reason)
         return Rollout(states, len(moves), StopReason.COMPLETED)
 
-    def _carry_out(self, before: RopeState, move: Array) -> tuple[RopeState, StopReason]:
+    def _carry_out(self, before: RopeState, move: Array) -> tuple[RopeState, Enum]:
         share = self._share_without_contact(before.grippers, move)
         legal, arrived = self._move(before, share * move)
         if not arrived:
-            return legal, StopReason.OVERSTRETCHED
+            return legal, RopeStopReason.OVERSTRETCHED
         self._engine().step(RESTING_STEPS)
         rested = self._engine().save()
         if self._checked_length(rested) > self.scene.max_band_length:
-            return legal, StopReason.OVERSTRETCHED
-        return rested, StopReason.COMPLETED if share == 1.0 else StopReason.GRIPPER_CONTACT
+            return legal, RopeStopReason.OVERSTRETCHED
+        return rested, StopReason.COMPLETED if share == 1.0 else RopeStopReason.GRIPPER_CONTACT
 
     def _move(self, before: RopeState, move: Array) -> tuple[RopeState, bool]:
         """Return the last known legal state, and whether the grippers arrived."""
