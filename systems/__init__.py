@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from systems.rope.random_scenes import random_rope_scene
     from systems.rope.rope import Rope
     from systems.rope.scene import Scene
+    from systems.rope.simulation.state import RopeState
+    from systems.rope.simulation.stop_reason import RopeStopReason
 
 __all__ = [
     "Box",
@@ -31,6 +33,8 @@ __all__ = [
     "Problem",
     "Rollout",
     "Rope",
+    "RopeState",
+    "RopeStopReason",
     "Scene",
     "SimulationDivergedError",
     "StopReason",
@@ -52,6 +56,8 @@ _HOMES = {
     "Cylinder": "systems.rope.obstacles.shapes",
     "PlanarArm": "systems.planar_arm.planar_arm",
     "Rope": "systems.rope.rope",
+    "RopeState": "systems.rope.simulation.state",
+    "RopeStopReason": "systems.rope.simulation.stop_reason",
     "Scene": "systems.rope.scene",
     "check_system": "systems.contract_checks",
     "load_scene": "systems.rope.paper_scenes",

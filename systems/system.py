@@ -56,7 +56,7 @@ class Rollout:
 
     states: Sequence[Any] | Array
     n_completed: int
-    stop_reason: StopReason
+    stop_reason: Enum
 
 
 class System(ABC):

@@ -1,7 +1,8 @@
-"""What the curtain's features see, against a plain reference, and what they do not depend on."""
+"""Clearance features: against a plain reference, and what they do not depend on."""
 
 import numpy as np
 import pytest
+from rope_states import pbd_nodes
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -10,11 +11,11 @@ from systems import Box, Rope, Scene, check_system, random_rope_scene
 from systems.rope.band.band import band_length, band_points, reduced_dim, resample_bands
 from systems.rope.features.clearance import clearance_features, mirrored, reversed_ends
 from systems.rope.obstacles.signed_distance import signed_distance
-from systems.rope.slack.pbd_ropes import KINDS, pbd_dim, pbd_nodes
+from systems.rope.slack.pbd_ropes import KINDS, pbd_dim
 
 N_COLUMNS, N_ROWS, DEPTH = 16, 8, 1.2
 N_CELLS = N_COLUMNS * N_ROWS
-BEFORE, AFTER, CURTAIN, SHEETS = np.cumsum([0, 4, 4, N_CELLS])
+BEFORE, AFTER, HANGING, PBD = np.cumsum([0, 4, 4, N_CELLS])
 
 
 def states_of(rope, seed=0):
@@ -42,7 +43,7 @@ def parts_of(row, scene):
     return row[:width], pbd_nodes(row[width:], row[:6])
 
 
-def reference_curtain(band, scene):
+def reference_hanging(band, scene):
     points = band_points(band)
     shadow = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1)
     travelled = np.concatenate([[0.0], np.cumsum(shadow)])
@@ -62,7 +63,7 @@ def in_units(samples, scene):
     return np.clip(distances, -0.05, 0.15) / 0.05
 
 
-def reference_sheet(band, nodes, scene):
+def reference_pbd(band, nodes, scene):
     at = (np.arange(N_COLUMNS) + 0.5) / N_COLUMNS
     fractions = np.linspace(0.0, 1.0, len(nodes))
     on_rope = np.column_stack([np.interp(at, fractions, column) for column in nodes.T])
@@ -88,7 +89,7 @@ def test_it_agrees_with_a_plain_reference(name):
     for states, first in ((before, BEFORE), (after, AFTER)):
         for i, state in enumerate(states):
             band, _ = parts_of(state, rope.scene)
-            expected, depth = reference_curtain(band, rope.scene)
+            expected, depth = reference_hanging(band, rope.scene)
             lengths = [
                 np.linalg.norm(state[3:6] - state[:3]),
                 band_length(band[None])[0],
@@ -98,11 +99,11 @@ def test_it_agrees_with_a_plain_reference(name):
             shares = np.divide(lengths, rope.scene.rope_length)
             np.testing.assert_allclose(rows[i, first : first + 4], shares, atol=1e-5)
             if first == AFTER:
-                np.testing.assert_allclose(rows[i, CURTAIN:SHEETS], expected, atol=1e-4)
+                np.testing.assert_allclose(rows[i, HANGING:PBD], expected, atol=1e-4)
     for i, state in enumerate(after):
         band, ropes = parts_of(state, rope.scene)
-        expected = np.hstack([reference_sheet(band, nodes, rope.scene) for nodes in ropes])
-        np.testing.assert_allclose(rows[i, SHEETS:-6], expected, atol=1e-4)
+        expected = np.hstack([reference_pbd(band, nodes, rope.scene) for nodes in ropes])
+        np.testing.assert_allclose(rows[i, PBD:-6], expected, atol=1e-4)
 
 
 def test_a_bar_below_the_band_is_seen_where_it_is():
@@ -113,7 +114,7 @@ def test_a_bar_below_the_band_is_seen_where_it_is():
     band = np.concatenate([grippers.ravel(), grippers.ravel()])
     filled = np.tile(grippers[1], (reduced_dim(scene) - 12) // 3)
     row = np.concatenate([band, filled, np.zeros(pbd_dim(scene))])[None]
-    cells = clearance_features(row, row, scene)[0, CURTAIN:SHEETS].reshape(N_COLUMNS, N_ROWS)
+    cells = clearance_features(row, row, scene)[0, HANGING:PBD].reshape(N_COLUMNS, N_ROWS)
     inside = np.argwhere(cells < 0)
     assert set(inside[:, 0]) == {7, 8}, "the bar crosses the middle of the band"
     assert 0 < inside[:, 1].min() <= inside[:, 1].max() < N_ROWS - 1, "and hangs above the rope"
@@ -183,7 +184,7 @@ def test_symmetries_are_those_of_the_world():
     np.testing.assert_allclose(mirrored(X), image, atol=1e-4)
 
 
-def test_the_rope_with_curtains_is_a_system():
+def test_the_rope_with_clearance_features_is_a_system():
     check_system(Rope(features="clearance"))
 
 

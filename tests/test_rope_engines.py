@@ -12,16 +12,19 @@ from hypothesis.extra.numpy import arrays
 from rope_paths import PATHS, path_commands
 
 from systems.errors import SimulationDivergedError
+from systems.rope.catenary import hanging_rope
 from systems.rope.obstacles.shapes import Box, Capsule, Cylinder
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.paper_scenes import SCENE_NAMES, load_scene
-from systems.rope.scene import GRIPPER_RADIUS, ROPE_RADIUS, Scene, hanging_rope
-from systems.rope.simulation.quasistatic import ENGINES, RopeRollout, rope_length
+from systems.rope.scene import GRIPPER_RADIUS, ROPE_RADIUS, Scene
+from systems.rope.simulation.engines import ENGINES
+from systems.rope.simulation.quasistatic import RopeRollout, rope_length
 from systems.rope.simulation.state import RopeState
+from systems.rope.simulation.stop_reason import RopeStopReason
 from systems.system import StopReason
 
 RESTART_TOLERANCE = {"mujoco": 0.0, "pybullet": 1e-3}
-STOP_REASONS = {"caught": StopReason.OVERSTRETCHED, "free": StopReason.COMPLETED}
+STOP_REASONS = {"caught": RopeStopReason.OVERSTRETCHED, "free": StopReason.COMPLETED}
 SCENES = [
     pytest.param(name, marks=[] if name == "simple_hook" else pytest.mark.slow)
     for name in SCENE_NAMES
@@ -153,7 +156,7 @@ def test_rope_does_not_tunnel_through_five_centimetres(engine, obstacle, directi
     rollout = RopeRollout(scene, engine)
     commands = np.tile(direction, (60, 2))
     executed = rollout.execute(rollout.settle(scene.start_rope()), commands)
-    assert executed.stop_reason is StopReason.OVERSTRETCHED
+    assert executed.stop_reason is RopeStopReason.OVERSTRETCHED
     for state in executed.states:
         middles = 0.5 * (state.nodes[1:] + state.nodes[:-1])
         assert clearance(scene, state.nodes) > 0.5 * ROPE_RADIUS
@@ -166,11 +169,11 @@ def test_gripper_stops_on_the_boundary_of_an_obstacle(engine):
     start = settled(rollout, [(0.2, 0.3, 0.2), (0.2, 0.0, 0.2)])
     forward = np.tile([0.02, 0.0, 0.0], 2)
     stopped = rollout.execute(start, np.tile(forward, (20, 1)))
-    assert stopped.stop_reason is StopReason.GRIPPER_CONTACT
+    assert stopped.stop_reason is RopeStopReason.GRIPPER_CONTACT
     last = stopped.states[-1]
     assert 0.0 <= clearance(rollout.scene, last.grippers) - GRIPPER_RADIUS < 1e-6
     again = rollout.execute(last, forward[None])
-    assert again.stop_reason is StopReason.GRIPPER_CONTACT
+    assert again.stop_reason is RopeStopReason.GRIPPER_CONTACT
     np.testing.assert_allclose(again.states[-1].grippers, last.grippers, atol=1e-6)
     back = rollout.execute(last, -forward[None])
     assert back.stop_reason is StopReason.COMPLETED
@@ -180,7 +183,7 @@ def test_stretched_rope_may_go_back():
     rollout = rollout_of("simple_hook", "mujoco")
     caught = executed("simple_hook", "mujoco", "caught")[1].states[-1]
     forward = np.tile([0.02, 0.0, 0.0], 2)
-    assert rollout.execute(caught, forward[None]).stop_reason is StopReason.OVERSTRETCHED
+    assert rollout.execute(caught, forward[None]).stop_reason is RopeStopReason.OVERSTRETCHED
     assert rollout.execute(caught, -forward[None]).stop_reason is StopReason.COMPLETED
 
 

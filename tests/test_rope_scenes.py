@@ -5,16 +5,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from systems.rope.catenary import hanging_rope
 from systems.rope.obstacles.shapes import Box
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.paper_scenes import SCENE_NAMES, load_scene
-from systems.rope.scene import (
-    GRIPPER_CLEARANCE,
-    GRIPPER_RADIUS,
-    ROPE_RADIUS,
-    Scene,
-    hanging_rope,
-)
+from systems.rope.scene import GRIPPER_CLEARANCE, GRIPPER_RADIUS, ROPE_RADIUS, Scene
 
 PAPER_LENGTHS = {
     "simple_hook_short": 0.55,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from systems.errors import SimulationDivergedError
-from systems.rope.obstacles.shapes import Array, Box, Cylinder, Obstacle
+from systems.rope.obstacles.mjcf import geom_xml, numbers_xml
+from systems.rope.obstacles.shapes import Array, Obstacle
 from systems.rope.scene import ROPE_RADIUS
 from systems.rope.simulation.state import RopeState
 
@@ -105,12 +105,12 @@ def _describe(obstacles: Sequence[Obstacle], rest: Array) -> str:
     edges = " ".join(f"{index} {index + 1}" for index in range(len(rest) - 1))
     bodies = [_body(name, place) for name, place in zip(names, rest, strict=True)]
     for end in (0, -1):
-        bodies[end] = f'<body name="{names[end]}" pos="{_text(rest[end])}" mocap="true"/>'
+        bodies[end] = f'<body name="{names[end]}" pos="{numbers_xml(rest[end])}" mocap="true"/>'
     return f"""
     <mujoco>
       <option timestep="{TIME_STEP}" gravity="0 0 {-GRAVITY}"><flag autoreset="disable"/></option>
       <default><geom contype="1" conaffinity="2" friction="{FRICTION}" {CONTACT}/></default>
-      <worldbody>{"".join(map(_geom, obstacles))}{"".join(bodies)}</worldbody>
+      <worldbody>{"".join(map(geom_xml, obstacles))}{"".join(bodies)}</worldbody>
       <deformable>
         <flex name="rope" dim="1" radius="{ROPE_RADIUS}" body="{" ".join(names)}" element="{edges}">
           <contact contype="2" conaffinity="0" selfcollide="none" condim="3"
@@ -124,20 +124,4 @@ def _describe(obstacles: Sequence[Obstacle], rest: Array) -> str:
 def _body(name: str, place: Array) -> str:
     joints = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
     inertia = f'<inertial pos="0 0 0" mass="{NODE_MASS}" diaginertia="1e-6 1e-6 1e-6"/>'
-    return f'<body name="{name}" pos="{_text(place)}">{inertia}{joints}</body>'
-
-
-def _geom(obstacle: Obstacle) -> str:
-    if isinstance(obstacle, Box):
-        size = _text(obstacle.half_extents)
-        return f'<geom type="box" pos="{_text(obstacle.center)}" size="{size}"/>'
-    if isinstance(obstacle, Cylinder):
-        half = obstacle.half_length * np.eye(3)[obstacle.axis]
-        ends = _text((*(obstacle.center - half), *(obstacle.center + half)))
-        return f'<geom type="cylinder" fromto="{ends}" size="{obstacle.radius}"/>'
-    ends = _text((*obstacle.start, *obstacle.end))
-    return f'<geom type="capsule" fromto="{ends}" size="{obstacle.radius}"/>'
-
-
-def _text(values: Any) -> str:
-    return " ".join(repr(float(value)) for value in values)
+    return f'<body name="{name}" pos="{numbers_xml(place)}">{inertia}{joints}</body>'
