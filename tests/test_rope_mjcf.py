@@ -64,6 +64,8 @@ def test_a_box_from_ranges_spans_them():
 PICTURES = """
 import sys
 import numpy as np
+from systems.rope.paper_scenes import load_scene
+from systems.rope.renderer import ROPE_COLOR, SceneRenderer
 
 scene = load_scene("engine_assembly")
 with SceneRenderer(scene, width=120, height=80) as renderer:
@@ -82,8 +84,9 @@ def test_pictures_show_obstacles_the_rope_and_the_goal(tmp_path):
     # In a process of its own: MuJoCo chooses how to render when it is first imported.
     file = tmp_path / "pictures.npy"
     done = subprocess.run([sys.executable, "-c", PICTURES, file], capture_output=True, text=True)
-    if done.returncode:
+    if any(word in done.stderr for word in ("EGL", "OpenGL", "OSMesa")):
         pytest.skip(f"MuJoCo can't render here: {done.stderr.splitlines()[-1]}")
+    assert done.returncode == 0, done.stderr
     empty, with_rope, with_goal, other_side = np.load(file).astype(int)
     assert empty.shape == (80, 120, 3)
     assert empty.std() > 10, "the engine is in it"
@@ -93,5 +96,6 @@ def test_pictures_show_obstacles_the_rope_and_the_goal(tmp_path):
     assert ((green > red) | (blue > red)).mean() > 0.8, "the rope is green, its grippers are blue"
     red, green, blue = with_goal[np.abs(with_goal - empty).sum(axis=2) > 60].T
     assert len(red) > 5
-    assert (red > green).mean() > 0.8, "the goal is red"
+    assert (red > 1.2 * green).sum() > 5, "the goal is red"
+    assert (red >= green).all(), "and its shadow grey"
     assert np.abs(other_side - empty).mean() > 3

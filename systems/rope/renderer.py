@@ -31,10 +31,11 @@ _MAX_GEOMS = 5000
 
 
 class SceneRenderer:
-    """Renders one scene as often as wanted; use it as a context manager.
+    """Renders pictures of one scene; use it as a context manager.
 
-    Without a display, MuJoCo needs ``MUJOCO_GL=egl`` (or ``osmesa``) in the environment before
-    it is first imported; here it is set to ``egl`` where neither it nor a display is.
+    Without a display, MuJoCo needs the environment variable ``MUJOCO_GL`` to be ``egl`` or
+    ``osmesa`` before it is first imported. On Linux without a display it is set to ``egl`` here,
+    unless it is set already.
 
     Parameters
     ----------

@@ -12,13 +12,15 @@ from systems.rope.obstacles.shapes import Array, Obstacle
 from systems.rope.scene import ROPE_RADIUS
 from systems.rope.simulation.state import RopeState
 
-# The rope moves quasi-statically: these make it follow its grippers and come to rest, without
-# jitter when it is taut and without lag when it is dragged over an edge.
+# These values make the rope move quasi-statically: it follows its grippers and comes to rest,
+# without jitter when it is taut and without lag when it is dragged over an edge. Units are SI.
 TIME_STEP = 0.005
 GRAVITY = 4.0
 NODE_MASS = 0.01
 FRICTION = 0.5
-VELOCITY_KEPT = 0.95  # of it, after every group of steps: slack swings down without overshoot
+# Share of the velocities that is kept after each group of steps, so that slack comes down without
+# swinging.
+VELOCITY_KEPT = 0.95
 CONTACT = 'solref="0.01 1" solimp="0.95 0.99 0.001"'
 STRETCH = 'solref="0.01 1" solimp="0.9 0.95 0.001"'
 
@@ -26,9 +28,9 @@ STRETCH = 'solref="0.01 1" solimp="0.9 0.95 0.001"'
 class MujocoRope:
     """A rope of ``n_nodes`` point masses, joined by capsules of ``spacing`` metres at rest.
 
-    Both end nodes are mocap bodies, so the grippers are where they are told to be, without any
-    constraint in between. A state that is loaded goes on bit by bit as the one that was saved,
-    in any instance.
+    Both end nodes are mocap bodies, whose positions are set, so the grippers are exactly where they
+    are told to be. A simulation that goes on from a loaded state is bit for bit the same as the one
+    that the state was saved from, in any instance.
 
     Parameters
     ----------
