@@ -14,6 +14,8 @@ from .rope.paper_scenes import load_scene as load_scene
 from .rope.random_scenes import random_rope_scene as random_rope_scene
 from .rope.rope import Rope as Rope
 from .rope.scene import Scene as Scene
+from .rope.simulation.state import RopeState as RopeState
+from .rope.simulation.stop_reason import RopeStopReason as RopeStopReason
 from .system import Problem as Problem
 from .system import Rollout as Rollout
 from .system import StopReason as StopReason

@@ -12,7 +12,7 @@ from planners.edge_discretization import split_edges
 from planners.search_tree import nearest_rows
 from reliability.mlp_kernel import mlp_logits
 from systems.planar_arm.kernels import limited_targets, transition_features
-from systems.rope.kernels import length_between
+from systems.rope.rope_length import length_between
 
 points = arrays(np.float64, (3, 3), elements=st.floats(-4, 4))
 

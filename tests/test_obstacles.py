@@ -3,8 +3,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from systems.rope.obstacles import shapes
 from systems.rope.obstacles.shapes import Box, Capsule, Cylinder, pack_obstacles
-from systems.rope.obstacles.signed_distance import signed_distance, signed_distance_and_gradient
+from systems.rope.obstacles.signed_distance import signed_distance
+from systems.rope.obstacles.signed_distance_kernels import distance_and_gradient
 
 coordinate = st.floats(-1.0, 1.0)
 point = st.tuples(coordinate, coordinate, coordinate)
@@ -18,6 +20,11 @@ capsules = st.builds(
     size,
 )
 obstacle = st.one_of(boxes, cylinders, capsules)
+
+
+def with_gradient(p, packed):
+    distance, *gradient = distance_and_gradient(*map(float, p), packed)
+    return distance, np.array(gradient)
 
 
 def box_reference(p, box):
@@ -58,7 +65,7 @@ def test_the_distance_is_the_smallest_of_the_obstacles_distances(obstacles, poin
 @settings(deadline=None)
 def test_the_gradient_leads_to_the_surface(obstacle, p):
     packed = pack_obstacles([obstacle])
-    distance, gradient = signed_distance_and_gradient(np.array(p), packed)
+    distance, gradient = with_gradient(p, packed)
     assert np.linalg.norm(gradient) == pytest.approx(1.0)
     if distance > 0.0:
         on_surface = np.array(p) - distance * gradient
@@ -69,12 +76,60 @@ def test_the_gradient_leads_to_the_surface(obstacle, p):
 @settings(deadline=None)
 def test_following_the_gradient_increases_the_distance_as_far_as_one_goes(obstacles, p):
     packed = pack_obstacles(obstacles)
-    distance, gradient = signed_distance_and_gradient(np.array(p), packed)
+    distance, gradient = with_gradient(p, packed)
     moved = signed_distance(np.array(p) + 1e-7 * gradient, packed)
     # Where two surfaces are equally near, the distance to one of them grows and the other may not.
     nearest = sorted(reference(p, [each]) for each in obstacles)
     if len(nearest) == 1 or nearest[1] - nearest[0] > 1e-6:
         assert moved - distance == pytest.approx(1e-7, rel=1e-2)
+
+
+@given(st.lists(obstacle, min_size=1, max_size=6), point, st.tuples(size, coordinate, size))
+@settings(deadline=None, derandomize=True)
+def test_distances_change_by_no_more_than_the_point_moves(obstacles, p, way):
+    packed = pack_obstacles(obstacles)
+    here, there = signed_distance(np.array([p, np.add(p, way)]), packed)
+    assert abs(there - here) <= np.linalg.norm(way) + 1e-9
+
+
+@given(st.lists(obstacle, min_size=2, max_size=6), st.lists(point, min_size=1, max_size=8))
+@settings(deadline=None, derandomize=True)
+def test_distances_are_to_the_union_in_whatever_order_it_is_given(obstacles, points):
+    points = np.array(points)
+    distances = signed_distance(points, pack_obstacles(obstacles))
+    np.testing.assert_array_equal(
+        signed_distance(points, pack_obstacles(obstacles[::-1])), distances
+    )
+    without = signed_distance(points, pack_obstacles(obstacles[1:]))
+    alone = signed_distance(points, pack_obstacles(obstacles[:1]))
+    np.testing.assert_allclose(distances, np.minimum(without, alone), atol=1e-9)
+
+
+@given(obstacle, point)
+@settings(deadline=None, derandomize=True)
+def test_inside_an_obstacle_the_gradient_leads_out_the_shortest_way(each, p):
+    packed = pack_obstacles([each])
+    distance, gradient = with_gradient(p, packed)
+    if distance < -1e-6:
+        surface = np.array(p) - distance * gradient
+        assert signed_distance(surface, packed) == pytest.approx(0.0, abs=1e-9)
+        beyond = np.array(p) - (distance - 0.01) * gradient
+        assert signed_distance(beyond, packed) > 0.0
+
+
+def test_packed_obstacles_have_boxes_first_and_named_columns():
+    capsule = Capsule((0.1, 0.2, 0.3), (0.4, 0.6, 0.8), 0.05)
+    cylinder = Cylinder((1.0, 2.0, 3.0), 0.1, 0.2, axis=1)
+    box = Box((-1.0, -2.0, -3.0), (0.1, 0.2, 0.3))
+    packed = pack_obstacles([capsule, cylinder, box])
+    np.testing.assert_array_equal(packed[:, shapes.KIND], [shapes.BOX, shapes.CYLINDER, 2.0])
+    np.testing.assert_array_equal(packed[0, [shapes.X, shapes.Y, shapes.Z]], box.center)
+    half = [shapes.HALF_X, shapes.HALF_Y, shapes.HALF_Z]
+    np.testing.assert_array_equal(packed[0, half], box.half_extents)
+    np.testing.assert_array_equal(packed[1, [shapes.AXIS, shapes.HALF_LENGTH]], [1, 0.2])
+    core = [shapes.CORE_X, shapes.CORE_Y, shapes.CORE_Z]
+    np.testing.assert_allclose(packed[2, core], [0.3, 0.4, 0.5])
+    np.testing.assert_array_equal(packed[1:, shapes.RADIUS], [0.1, 0.05])
 
 
 def test_points_keep_their_shape():
@@ -85,8 +140,9 @@ def test_points_keep_their_shape():
 
 
 def test_without_obstacles_everything_is_far_away():
-    distance, gradient = signed_distance_and_gradient(np.zeros((1, 3)), pack_obstacles([]))
-    assert distance[0] >= 1e9
+    distance, gradient = with_gradient(np.zeros(3), pack_obstacles([]))
+    assert distance >= 1e9
+    assert signed_distance(np.zeros((1, 3)), pack_obstacles([]))[0] == distance
     assert (gradient == 0.0).all()
 
 
@@ -99,7 +155,7 @@ def test_gradients_are_finite_where_directions_are_ambiguous(p):
         Capsule((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), 0.1),
         Capsule((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), 0.1),
     ):
-        _, gradient = signed_distance_and_gradient(np.array(p), pack_obstacles([each]))
+        _, gradient = with_gradient(p, pack_obstacles([each]))
         assert np.linalg.norm(gradient) == pytest.approx(1.0)
 
 

@@ -3,26 +3,22 @@
 import numpy as np
 import pytest
 from rope_paths import PATHS, path_commands
+from rope_states import pbd_nodes, polyline_length
 
 from systems import Box, Rope, Scene
 from systems.rope.band.band import reduced_dim
+from systems.rope.catenary import hanging_rope
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.paper_scenes import load_scene
-from systems.rope.scene import hanging_rope
 from systems.rope.simulation.quasistatic import RopeRollout
-from systems.rope.slack.pbd_ropes import (
-    KINDS,
-    pbd_dim,
-    pbd_nodes,
-    pbd_ropes_at_rest,
-    propagate_pbd_ropes,
-)
+from systems.rope.slack.pbd_kernels import propagate_pbd_ropes
+from systems.rope.slack.pbd_ropes import KINDS, pbd_dim, pbd_model, pbd_ropes_at_rest
 
 WORLD = np.array([[-2.0] * 3, [2.0] * 3])
 ENDS = np.array([[0.0, -0.2, 0.0], [0.0, 0.2, 0.0]])
 
 
-def hall(*obstacles, length=0.6):
+def room(*obstacles, length=0.6):
     away = ENDS + np.array([1.2, 0.0, 0.0])
     return Scene(obstacles, WORLD, length, away, away)
 
@@ -66,13 +62,14 @@ def reference_move(nodes, moved, command, spacing, kind, packed):
 
 
 def moved_by(command, row, grippers, scene):
-    moves, longest = np.array([True]), scene.max_band_length
-    return propagate_pbd_ropes(row, grippers[None], command[None], moves, scene, longest)
+    allowed, model = np.array([True]), pbd_model(scene)
+    limit = scene.max_band_length
+    return propagate_pbd_ropes(row, grippers[None], command[None], allowed, model, limit)
 
 
-def carried(scene, loose, grippers, commands):
+def carried_along(scene, ropes, grippers, commands):
     """Return the nodes after each command that is valid in turn, (T, n_ropes, n_nodes, 3)."""
-    row, nodes = loose[None], []
+    row, nodes = ropes[None], []
     for command in commands:
         row, valid = moved_by(command, row, grippers, scene)
         if not valid[0]:
@@ -84,7 +81,7 @@ def carried(scene, loose, grippers, commands):
 
 def test_it_agrees_with_a_plain_reference():
     bar = Box((0.05, 0.0, -0.1), (0.3, 0.03, 0.03), "bar")
-    scene = hall(bar)
+    scene = room(bar)
     nodes = hanging_rope(ENDS + np.array([0, 0, 0.2]), 0.6, scene.n_nodes)
     spacing, rng = 0.6 / (scene.n_nodes - 1), np.random.default_rng(0)
     row, grippers = pbd_ropes_at_rest(nodes)[None], nodes[[0, -1]].ravel()
@@ -104,18 +101,18 @@ def test_it_agrees_with_a_plain_reference():
 
 
 def test_a_rope_in_the_air_hangs_as_a_catenary():
-    scene = hall()
+    scene = room()
     laid = np.linspace(*ENDS, scene.n_nodes)
     still = np.zeros((200, 6))
-    ropes = carried(scene, pbd_ropes_at_rest(laid), ENDS.ravel(), still)[-1]
+    ropes = carried_along(scene, pbd_ropes_at_rest(laid), ENDS.ravel(), still)[-1]
     expected = hanging_rope(ENDS, 0.6, scene.n_nodes)
     np.testing.assert_allclose(ropes, [expected] * len(KINDS), atol=0.01)
 
 
 def test_it_lies_on_a_bar_and_not_in_it():
-    scene = hall(Box((0.0, 0.0, -0.1), (0.3, 0.03, 0.03), "bar"))
+    scene = room(Box((0.0, 0.0, -0.1), (0.3, 0.03, 0.03), "bar"))
     laid = np.linspace(*ENDS, scene.n_nodes)
-    ropes = carried(scene, pbd_ropes_at_rest(laid), ENDS.ravel(), np.zeros((200, 6)))[-1]
+    ropes = carried_along(scene, pbd_ropes_at_rest(laid), ENDS.ravel(), np.zeros((200, 6)))[-1]
     for nodes, (_, radius) in zip(ropes, KINDS, strict=True):
         middle = nodes[scene.n_nodes // 2]
         assert -0.07 + radius - 1e-6 < middle[2] < -0.05
@@ -123,11 +120,11 @@ def test_it_lies_on_a_bar_and_not_in_it():
 
 
 def test_ropes_whose_commands_are_not_carried_out_stay():
-    scene = hall()
+    scene = room()
     rows = np.tile(pbd_ropes_at_rest(hanging_rope(ENDS, 0.6, scene.n_nodes)), (2, 1))
     grippers, command = np.tile(ENDS.ravel(), (2, 1)), np.full((2, 6), 0.01)
     moves = np.array([False, True])
-    moved, valid = propagate_pbd_ropes(rows, grippers, command, moves, scene, np.inf)
+    moved, valid = propagate_pbd_ropes(rows, grippers, command, moves, pbd_model(scene), np.inf)
     np.testing.assert_array_equal(valid, moves)
     np.testing.assert_array_equal(moved[0], rows[0])
     assert np.abs(moved[1] - rows[1]).max() > 0.005
@@ -140,8 +137,8 @@ def test_it_moves_like_the_rope_and_is_caught_where_the_rope_is(name, kind):
     commands, rollout = path_commands(path), RopeRollout(scene)
     start = rollout.settle(hanging_rope(path[0], scene.rope_length, scene.n_nodes))
     executed = rollout.execute(start, commands)
-    loose = pbd_ropes_at_rest(start.nodes)
-    ropes = carried(scene, loose, start.grippers.ravel(), commands)
+    at_rest = pbd_ropes_at_rest(start.nodes)
+    ropes = carried_along(scene, at_rest, start.grippers.ravel(), commands)
     n = executed.n_completed
     n_both = min(n, len(ropes))
     true = np.array([state.nodes for state in executed.states[1 : n_both + 1]])
@@ -152,7 +149,7 @@ def test_it_moves_like_the_rope_and_is_caught_where_the_rope_is(name, kind):
 
 
 def test_a_successor_may_not_overstretch_any_of_them():
-    scene = hall(length=0.4)
+    scene = room(length=0.4)
     ends = 0.999 * ENDS * scene.max_band_length / 0.4
     taut = pbd_ropes_at_rest(np.linspace(*ends, scene.n_nodes))
     apart = 0.001 * ENDS.ravel() * scene.max_band_length / 0.4
@@ -164,7 +161,7 @@ def test_a_successor_may_not_overstretch_any_of_them():
 
 @pytest.mark.parametrize("overstretched", range(len(KINDS)))
 def test_it_takes_only_one_of_them(overstretched):
-    scene = hall()
+    scene = room()
     near = np.array([[0.0, -0.05, 0.0], [0.0, 0.05, 0.0]])
     ropes = np.tile(hanging_rope(near, 0.6, scene.n_nodes), (len(KINDS), 1, 1))
     ropes[overstretched, 1:-1, 2] -= 0.4
@@ -178,28 +175,29 @@ def test_it_takes_only_one_of_them(overstretched):
 
 def test_many_at_once_move_as_each_does_alone():
     bar = Box((0.05, 0.0, -0.1), (0.3, 0.03, 0.03), "bar")
-    scene, rng = hall(bar), np.random.default_rng(0)
+    scene, rng = room(bar), np.random.default_rng(0)
     rest = pbd_ropes_at_rest(hanging_rope(ENDS, 0.6, scene.n_nodes))
     rows, grippers = np.tile(rest, (70, 1)), np.tile(ENDS.ravel(), (70, 1))
     rows += rng.normal(scale=0.002, size=rows.shape)
     commands = rng.uniform(0.1, 1.0, size=(70, 1)) * rng.uniform(-0.025, 0.025, size=(70, 6))
     moves = rng.random(70) < 0.8
-    free, _ = propagate_pbd_ropes(rows, grippers, commands, moves, scene, np.inf)
+    free, _ = propagate_pbd_ropes(rows, grippers, commands, moves, pbd_model(scene), np.inf)
     ropes = [pbd_nodes(*row) for row in zip(free, grippers + commands, strict=True)]
-    longest = np.median(np.linalg.norm(np.diff(ropes, axis=2), axis=3).sum(axis=2))
-    together, valid = propagate_pbd_ropes(rows, grippers, commands, moves, scene, longest)
+    longest = np.median(polyline_length(np.array(ropes)))
+    model = pbd_model(scene)
+    together, valid = propagate_pbd_ropes(rows, grippers, commands, moves, model, longest)
     assert 0 < np.count_nonzero(valid) < np.count_nonzero(moves)
     for i in range(70):
         one = slice(i, i + 1)
         alone = propagate_pbd_ropes(
-            rows[one], grippers[one], commands[one], moves[one], scene, longest
+            rows[one], grippers[one], commands[one], moves[one], model, longest
         )
         np.testing.assert_array_equal(together[one], alone[0])
         assert valid[i] == alone[1][0]
 
 
 def test_nodes_at_one_place_do_not_stop_it():
-    scene = hall()
+    scene = room()
     row = pbd_ropes_at_rest(np.zeros((scene.n_nodes, 3)))[None]
     moved, valid = moved_by(np.zeros(6), row, ENDS.ravel(), scene)
     assert valid[0]

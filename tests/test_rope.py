@@ -5,15 +5,15 @@ import pickle
 import joblib
 import numpy as np
 import pytest
+from rope_states import slow_margin
 
 from planners import BiasedRRT
 from reliability import collect_transitions
-from systems import Box, Rope, Scene, check_system
+from systems import Box, Rope, RopeState, Scene, check_system
 from systems.rope.band.band import band_length, reduced_dim
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.paper_scenes import SCENE_NAMES
 from systems.rope.scene import GRIPPER_CLEARANCE
-from systems.rope.simulation.state import RopeState
 
 
 @pytest.fixture(scope="module")
@@ -24,13 +24,6 @@ def rope():
 @pytest.fixture(scope="module")
 def start(rope):
     return rope.reduce(rope.scene_problem().start)
-
-
-def slow_margin(scene, grippers):
-    """Distance of grippers, (2, 3), to whatever is nearest."""
-    inside = min((grippers - scene.bounds[0]).min(), (scene.bounds[1] - grippers).min())
-    apart = np.linalg.norm(grippers[0] - grippers[1])
-    return min(inside, apart, signed_distance(grippers, scene.packed).min())
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
@@ -232,10 +225,10 @@ def test_bad_rows_states_and_goals_are_refused(rope, start):
         (lambda: rope.propagate(rows, moves + np.inf), "command must be finite"),
         (lambda: rope.propagate(rows[:, :-1], moves), "reduced must have the shape"),
         (lambda: rope.steer(rows, moves[:, :3]), "configuration must have the shape"),
-        (lambda: rope.steer(rows, np.zeros((2, 6))), "configuration must have the shape"),
+        (lambda: rope.steer(rows, np.zeros((2, 6))), "configuration must have as many rows"),
         (lambda: rope.features(broken, rows), "reduced must be finite"),
         (lambda: rope.close(rows, np.hstack([rows, rows])), "executed must have the shape"),
-        (lambda: rope.close(rows, np.vstack([rows, rows])), "executed must have the shape"),
+        (lambda: rope.close(rows, np.vstack([rows, rows])), "executed must have as many rows"),
         (lambda: rope.close(rows[0], rows), "predicted must have the shape"),
         (lambda: rope.close(rows, broken), "executed must be finite"),
         (lambda: rope.bands(broken), "reduced must be finite"),

@@ -1,20 +1,25 @@
-"""What the curtain's features see, against a plain reference, and what they do not depend on."""
+"""Clearance features: against a plain reference, and what they do not depend on."""
 
+import hypothesis.strategies as st
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis.extra.numpy import arrays
+from rope_states import pbd_nodes
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from planners import BiasedRRT
-from systems import Box, Rope, Scene, check_system, random_rope_scene
+from systems import Box, Rope, Scene, check_system
 from systems.rope.band.band import band_length, band_points, reduced_dim, resample_bands
 from systems.rope.features.clearance import clearance_features, mirrored, reversed_ends
 from systems.rope.obstacles.signed_distance import signed_distance
-from systems.rope.slack.pbd_ropes import KINDS, pbd_dim, pbd_nodes
+from systems.rope.slack.pbd_ropes import KINDS, pbd_dim
 
 N_COLUMNS, N_ROWS, DEPTH = 16, 8, 1.2
 N_CELLS = N_COLUMNS * N_ROWS
-BEFORE, AFTER, CURTAIN, SHEETS = np.cumsum([0, 4, 4, N_CELLS])
+ENDS = np.array([[0.5, -0.3, 0.0], [0.5, 0.3, 0.0]])
+BEFORE, AFTER, HANGING, PBD = np.cumsum([0, 4, 4, N_CELLS])
 
 
 def states_of(rope, seed=0):
@@ -42,7 +47,7 @@ def parts_of(row, scene):
     return row[:width], pbd_nodes(row[width:], row[:6])
 
 
-def reference_curtain(band, scene):
+def reference_hanging(band, scene):
     points = band_points(band)
     shadow = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1)
     travelled = np.concatenate([[0.0], np.cumsum(shadow)])
@@ -62,7 +67,7 @@ def in_units(samples, scene):
     return np.clip(distances, -0.05, 0.15) / 0.05
 
 
-def reference_sheet(band, nodes, scene):
+def reference_pbd(band, nodes, scene):
     at = (np.arange(N_COLUMNS) + 0.5) / N_COLUMNS
     fractions = np.linspace(0.0, 1.0, len(nodes))
     on_rope = np.column_stack([np.interp(at, fractions, column) for column in nodes.T])
@@ -88,7 +93,7 @@ def test_it_agrees_with_a_plain_reference(name):
     for states, first in ((before, BEFORE), (after, AFTER)):
         for i, state in enumerate(states):
             band, _ = parts_of(state, rope.scene)
-            expected, depth = reference_curtain(band, rope.scene)
+            expected, depth = reference_hanging(band, rope.scene)
             lengths = [
                 np.linalg.norm(state[3:6] - state[:3]),
                 band_length(band[None])[0],
@@ -98,11 +103,11 @@ def test_it_agrees_with_a_plain_reference(name):
             shares = np.divide(lengths, rope.scene.rope_length)
             np.testing.assert_allclose(rows[i, first : first + 4], shares, atol=1e-5)
             if first == AFTER:
-                np.testing.assert_allclose(rows[i, CURTAIN:SHEETS], expected, atol=1e-4)
+                np.testing.assert_allclose(rows[i, HANGING:PBD], expected, atol=1e-4)
     for i, state in enumerate(after):
         band, ropes = parts_of(state, rope.scene)
-        expected = np.hstack([reference_sheet(band, nodes, rope.scene) for nodes in ropes])
-        np.testing.assert_allclose(rows[i, SHEETS:-6], expected, atol=1e-4)
+        expected = np.hstack([reference_pbd(band, nodes, rope.scene) for nodes in ropes])
+        np.testing.assert_allclose(rows[i, PBD:-6], expected, atol=1e-4)
 
 
 def test_a_bar_below_the_band_is_seen_where_it_is():
@@ -113,7 +118,7 @@ def test_a_bar_below_the_band_is_seen_where_it_is():
     band = np.concatenate([grippers.ravel(), grippers.ravel()])
     filled = np.tile(grippers[1], (reduced_dim(scene) - 12) // 3)
     row = np.concatenate([band, filled, np.zeros(pbd_dim(scene))])[None]
-    cells = clearance_features(row, row, scene)[0, CURTAIN:SHEETS].reshape(N_COLUMNS, N_ROWS)
+    cells = clearance_features(row, row, scene)[0, HANGING:PBD].reshape(N_COLUMNS, N_ROWS)
     inside = np.argwhere(cells < 0)
     assert set(inside[:, 0]) == {7, 8}, "the bar crosses the middle of the band"
     assert 0 < inside[:, 1].min() <= inside[:, 1].max() < N_ROWS - 1, "and hangs above the rope"
@@ -183,19 +188,47 @@ def test_symmetries_are_those_of_the_world():
     np.testing.assert_allclose(mirrored(X), image, atol=1e-4)
 
 
-def test_the_rope_with_curtains_is_a_system():
+def test_the_rope_with_clearance_features_is_a_system():
     check_system(Rope(features="clearance"))
 
 
-def test_random_scenes_follow_from_their_seed_and_can_be_planned_in():
-    scene, again = random_rope_scene(5), random_rope_scene(5)
-    np.testing.assert_array_equal(scene.packed, again.packed)
-    scenes = [random_rope_scene(seed) for seed in range(40)]
-    assert len({len(scene.obstacles) for scene in scenes}) > 4
-    lengths = [scene.rope_length for scene in scenes]
-    assert min(lengths) < 0.7
-    assert max(lengths) > 1.2
-    rope = Rope(scenes[1])
-    problem = rope.sample_problem(0)
-    planner = BiasedRRT(rope, max_iterations=5000, random_state=0)
-    assert planner.plan(rope.reduce(problem.start), problem.goal).success
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(arrays(np.float32, (3, 496), elements=st.floats(-3.0, 3.0, width=32)))
+def test_twice_mirrored_or_twice_reversed_is_as_before(X):
+    np.testing.assert_array_equal(mirrored(mirrored(X)), X)
+    np.testing.assert_array_equal(reversed_ends(reversed_ends(X)), X)
+    both = reversed_ends(mirrored(X))
+    np.testing.assert_array_equal(mirrored(reversed_ends(X)), both)
+    changed = (mirrored(X) != X).any(axis=0)
+    assert changed.sum() <= 2 * 16 + 2, "sideways offsets and motions, and nothing else"
+    assert both.dtype == X.dtype
+    assert mirrored(X[:0]).shape == reversed_ends(X[:0]).shape == (0, 496)
+
+
+def test_grippers_above_one_another_have_features_too():
+    scene = Scene([], np.array([[-2.0] * 3, [2.0] * 3]), 0.8, ENDS, ENDS)
+    above = np.array([[0.0, 0.0, 0.3], [0.0, 0.0, -0.1]])
+    points = np.tile(above[1], (n_points(scene), 1))
+    points[0] = above[0]
+    nodes = np.linspace(*above, scene.n_nodes)[1:-1]
+    row = rows_of_points(points[None], np.tile(nodes, (1, len(KINDS), 1, 1)))
+    after = row + 0.0
+    after[:, :3] += (0.01, 0.0, 0.0)
+    X = clearance_features(row, after, scene)
+    assert np.isfinite(X).all()
+    np.testing.assert_allclose(X[0, BEFORE : BEFORE + 3], np.array([0.4, 0.4, -0.4]) / 0.8)
+    assert X[0, BEFORE + 3] > 0.0, "the rope hangs below"
+    np.testing.assert_allclose(X[0, -6:], [0.4, 0.0, 0.0, 0.0, 0.0, 0.0], atol=1e-6)
+    np.testing.assert_array_equal(X[:, HANGING:PBD], 3.0)
+
+
+def test_bad_rows_are_refused():
+    scene = Scene([], np.array([[-2.0] * 3, [2.0] * 3]), 0.8, ENDS, ENDS)
+    rows = np.zeros((2, reduced_dim(scene) + pbd_dim(scene)))
+    for before, after, message in (
+        (rows[:, 1:], rows, "reduced must have the shape"),
+        (rows, rows[:1], "next_reduced must have the shape"),
+        (rows, rows + np.nan, "next_reduced must be finite"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            clearance_features(before, after, scene)

@@ -12,11 +12,13 @@ from hypothesis.extra.numpy import arrays
 from rope_paths import PATHS, path_commands
 
 from systems.errors import SimulationDivergedError
+from systems.rope.catenary import hanging_rope
 from systems.rope.obstacles.shapes import Box, Capsule, Cylinder
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.paper_scenes import SCENE_NAMES, load_scene
-from systems.rope.scene import GRIPPER_RADIUS, ROPE_RADIUS, Scene, hanging_rope
-from systems.rope.simulation.quasistatic import ENGINES, RopeRollout, rope_length
+from systems.rope.scene import GRIPPER_RADIUS, ROPE_RADIUS, Scene
+from systems.rope.simulation.engines import ENGINES
+from systems.rope.simulation.quasistatic import RopeRollout, rope_length
 from systems.rope.simulation.state import RopeState
 from systems.rope.simulation.stop_reason import RopeStopReason
 from systems.system import StopReason

@@ -5,16 +5,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from planners import BiasedRRT
+from systems import Rope, random_rope_scene
+from systems.rope.catenary import hanging_rope
 from systems.rope.obstacles.shapes import Box
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.paper_scenes import SCENE_NAMES, load_scene
-from systems.rope.scene import (
-    GRIPPER_CLEARANCE,
-    GRIPPER_RADIUS,
-    ROPE_RADIUS,
-    Scene,
-    hanging_rope,
-)
+from systems.rope.random_scenes import has_slot_and_slit
+from systems.rope.scene import GRIPPER_CLEARANCE, GRIPPER_RADIUS, ROPE_RADIUS, Scene
 
 PAPER_LENGTHS = {
     "simple_hook_short": 0.55,
@@ -159,3 +157,68 @@ def test_a_slack_rope_that_would_hang_into_an_obstacle_is_refused():
 
 def test_a_scene_of_ones_own_needs_no_obstacles():
     assert scene(obstacles=[]).packed.shape == (0, 8)
+
+
+def test_random_scenes_follow_from_their_seed_and_can_be_planned_in():
+    scene, again = random_rope_scene(5), random_rope_scene(5)
+    np.testing.assert_array_equal(scene.packed, again.packed)
+    scenes = [random_rope_scene(seed) for seed in range(40)]
+    assert len({len(scene.obstacles) for scene in scenes}) > 4
+    lengths = [scene.rope_length for scene in scenes]
+    assert min(lengths) < 0.7
+    assert max(lengths) > 1.2
+    rope = Rope(scenes[1])
+    problem = rope.sample_problem(0)
+    planner = BiasedRRT(rope, max_iterations=5000, random_state=0)
+    assert planner.plan(rope.reduce(problem.start), problem.goal).success
+
+
+def test_a_slot_lets_only_the_rope_through_and_a_slit_the_grippers_too():
+    scenes = [random_rope_scene(seed) for seed in range(13_000, 13_040)]
+    both = [scene for scene in scenes if has_slot_and_slit(scene)]
+    assert 3 < len(both) < 25
+    for scene in both:
+        named = {obstacle.name: obstacle for obstacle in scene.obstacles}
+        walls = [named[name] for name in ("lower slotted wall", "lower wall", "upper wall")]
+        slotted, lower, upper = (np.array([wall.center, wall.half_extents]) for wall in walls)
+        # The slot is level with the grippers' start and goal, 5 cm high.
+        assert slotted[0, 2] + slotted[1, 2] == pytest.approx(-0.025)
+        assert ROPE_RADIUS < 0.025 < GRIPPER_CLEARANCE
+        # The slit is around the same height, and grippers fit through it.
+        bottom, top = lower[0, 2] + lower[1, 2], upper[0, 2] - upper[1, 2]
+        assert bottom + top == pytest.approx(0.0, abs=1e-12)
+        assert 0.09 <= top - bottom <= 0.2
+        assert top - bottom > 2 * GRIPPER_CLEARANCE
+        # The slotted wall parts the grippers, whose sides of the room it leaves open.
+        a, b = scene.start[0, 1], scene.start[1, 1]
+        assert b < slotted[0, 1] < a
+
+
+def test_random_scenes_take_any_kind_of_random_state():
+    expected = random_rope_scene(7).packed
+    for random_state in (np.int64(7), np.random.default_rng(7), np.random.SeedSequence(7)):
+        np.testing.assert_array_equal(random_rope_scene(random_state).packed, expected)
+    rng = np.random.default_rng(7)
+    random_rope_scene(rng)
+    assert not np.array_equal(random_rope_scene(rng).packed, expected), "a generator advances"
+
+
+@given(st.tuples(*[st.floats(-0.5, 0.5)] * 3), st.floats(0.1, 1.5))
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_a_catenary_is_a_catenary_and_the_same_from_either_end(span, length):
+    grippers = np.array([[0.1, 0.2, 0.3], np.add([0.1, 0.2, 0.3], span)])
+    nodes = hanging_rope(grippers, length, 401)
+    np.testing.assert_allclose(hanging_rope(grippers[::-1], length, 401)[::-1], nodes, atol=1e-6)
+    shift = np.array([1.0, -2.0, 0.5])
+    np.testing.assert_allclose(
+        hanging_rope(grippers + shift, length, 401), nodes + shift, atol=1e-9
+    )
+    width, apart = np.hypot(span[0], span[1]), np.linalg.norm(span)
+    if width < 0.05 or length < 1.05 * apart:
+        return
+    # Along a catenary the slope grows in proportion to the arc length.
+    steps = np.diff(nodes, axis=0)
+    slopes = steps[:, 2] / np.hypot(steps[:, 0], steps[:, 1])
+    growth = np.diff(slopes)[5:-5]
+    np.testing.assert_allclose(growth, growth.mean(), rtol=1e-2)
+    assert growth.mean() > 0.0, "it sags"

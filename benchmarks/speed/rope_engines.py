@@ -15,7 +15,8 @@ import numpy as np
 
 from systems import Rope
 from systems.rope.paper_scenes import load_scene
-from systems.rope.simulation.quasistatic import ENGINES, RopeRollout
+from systems.rope.simulation.engines import ENGINES
+from systems.rope.simulation.quasistatic import RopeRollout
 
 SCENES = ("simple_hook_short", "simple_hook", "simple_hook_long", "simple_hook_very_long")
 STEP = 0.025

@@ -6,10 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from systems.rope.obstacles.shapes import Box, Capsule, Cylinder, Obstacle
+from systems.rope.obstacles.shapes import Box, Capsule, Cylinder, Obstacle, Range, box_from_ranges
 from systems.rope.scene import NODE_SPACING, Scene
-
-Range = tuple[float, float]
 
 # Links of the rope's capsule chain in the paper's four lengths.
 _SHORT, _REGULAR, _LONG, _VERY_LONG = 25, 39, 50, 70
@@ -41,13 +39,13 @@ def load_scene(name: str) -> Scene:
 def _simple_hook(name: str, links: int, half_width: float, start: Range, goal: Range) -> Scene:
     x, z, y = (0.375, 0.425), (-0.4, 0.4), (-half_width, half_width)
     obstacles = (
-        _box((-1.05, -0.95), (0.15, 0.25), z, "pillar"),
-        _box(x, y, (-0.4, -0.05), "lower wall"),
-        _box(x, y, (0.05, 0.4), "upper wall"),
-        _box((-0.7, 0.375), (-0.025, 0.025), (-0.075, -0.025), "hook"),
-        _box(x, (-0.025, 0.025), (-0.05, -0.025), "lower blocker"),
-        _box(x, (-0.025, 0.025), (0.025, 0.05), "upper blocker"),
-        _box((-1.3, 1.3), y, (-0.5, -0.4), "floor"),
+        box_from_ranges((-1.05, -0.95), (0.15, 0.25), z, "pillar"),
+        box_from_ranges(x, y, (-0.4, -0.05), "lower wall"),
+        box_from_ranges(x, y, (0.05, 0.4), "upper wall"),
+        box_from_ranges((-0.7, 0.375), (-0.025, 0.025), (-0.075, -0.025), "hook"),
+        box_from_ranges(x, (-0.025, 0.025), (-0.05, -0.025), "lower blocker"),
+        box_from_ranges(x, (-0.025, 0.025), (0.025, 0.05), "upper blocker"),
+        box_from_ranges((-1.3, 1.3), y, (-0.5, -0.4), "floor"),
     )
     return _along_x(name, obstacles, links, half_width, start, goal)
 
@@ -56,15 +54,15 @@ def _complex_hook() -> Scene:
     x, y, z = (-0.625, -0.575), (-0.45, 0.45), (-0.4, 0.4)
     below, above = (-0.4, -0.025), (0.025, 0.4)
     obstacles = (
-        _box((-1.05, -0.95), (0.15, 0.25), z, "pillar"),
-        _box(x, y, (-0.4, -0.05), "lower wall"),
-        _box(x, y, (0.05, 0.4), "upper wall"),
-        _box((-1.3, 0.5), (-0.275, -0.225), below, "lower separator wall"),
-        _box((-1.3, 0.5), (-0.275, -0.225), above, "upper separator wall"),
-        _box((-0.7, -0.625), (-0.175, -0.125), (-0.075, -0.025), "hook"),
-        _box(x, (-0.225, -0.125), below, "lower blocker"),
-        _box(x, (-0.225, -0.125), above, "upper blocker"),
-        _box((-1.3, 1.3), y, (-0.5, -0.4), "floor"),
+        box_from_ranges((-1.05, -0.95), (0.15, 0.25), z, "pillar"),
+        box_from_ranges(x, y, (-0.4, -0.05), "lower wall"),
+        box_from_ranges(x, y, (0.05, 0.4), "upper wall"),
+        box_from_ranges((-1.3, 0.5), (-0.275, -0.225), below, "lower separator wall"),
+        box_from_ranges((-1.3, 0.5), (-0.275, -0.225), above, "upper separator wall"),
+        box_from_ranges((-0.7, -0.625), (-0.175, -0.125), (-0.075, -0.025), "hook"),
+        box_from_ranges(x, (-0.225, -0.125), below, "lower blocker"),
+        box_from_ranges(x, (-0.225, -0.125), above, "upper blocker"),
+        box_from_ranges((-1.3, 1.3), y, (-0.5, -0.4), "floor"),
     )
     return _along_x("complex_hook", obstacles, _REGULAR, 0.45, (0.39, -0.37), (0.21, -0.18))
 
@@ -92,21 +90,21 @@ def _multi_hook() -> Scene:
     middle, hook_y = (-0.025, 0.025), (0.4, 0.525)
     left, right = (-0.975, -0.025), (0.025, 0.975)
     obstacles = (
-        _box((-1.025, -0.975), (-0.8, 0.8), z, "outer wall at -x"),
-        _box((0.975, 1.025), (-0.8, 0.8), z, "outer wall at +x"),
-        _box((-1.0, 1.0), (-0.825, -0.775), z, "outer wall at -y"),
-        _box((-1.0, 1.0), (0.775, 0.825), z, "outer wall at +y"),
-        _box(middle, (-0.775, 0.4), z, "separator wall"),
-        _box(middle, hook_y, (0.275, 0.325), "lower separator hook"),
-        _box(middle, hook_y, (0.475, 0.525), "upper separator hook"),
-        _box((-0.525, -0.475), (-0.575, -0.525), z, "pillar"),
-        _box(left, slit_y, (0.0, 0.2), "lower left wall"),
-        _box(left, slit_y, (0.3, 0.8), "upper left wall"),
+        box_from_ranges((-1.025, -0.975), (-0.8, 0.8), z, "outer wall at -x"),
+        box_from_ranges((0.975, 1.025), (-0.8, 0.8), z, "outer wall at +x"),
+        box_from_ranges((-1.0, 1.0), (-0.825, -0.775), z, "outer wall at -y"),
+        box_from_ranges((-1.0, 1.0), (0.775, 0.825), z, "outer wall at +y"),
+        box_from_ranges(middle, (-0.775, 0.4), z, "separator wall"),
+        box_from_ranges(middle, hook_y, (0.275, 0.325), "lower separator hook"),
+        box_from_ranges(middle, hook_y, (0.475, 0.525), "upper separator hook"),
+        box_from_ranges((-0.525, -0.475), (-0.575, -0.525), z, "pillar"),
+        box_from_ranges(left, slit_y, (0.0, 0.2), "lower left wall"),
+        box_from_ranges(left, slit_y, (0.3, 0.8), "upper left wall"),
         *(_hook_row((-0.8, -0.5, -0.2), (-0.15, -0.025), (0.15, 0.20), "left hook")),
-        _box(right, slit_y, (0.0, 0.5), "lower right wall"),
-        _box(right, slit_y, (0.6, 0.8), "upper right wall"),
+        box_from_ranges(right, slit_y, (0.0, 0.5), "lower right wall"),
+        box_from_ranges(right, slit_y, (0.6, 0.8), "upper right wall"),
         *(_hook_row((0.2, 0.5, 0.8), (0.025, 0.15), (0.45, 0.50), "right hook")),
-        _box((-1.0, 1.0), (-0.8, 0.8), (-0.1, 0.0), "floor"),
+        box_from_ranges((-1.0, 1.0), (-0.8, 0.8), (-0.1, 0.0), "floor"),
     )
     return Scene(
         obstacles=obstacles,
@@ -144,15 +142,8 @@ def _engine_assembly() -> Scene:
     )
 
 
-def _box(x: Range, y: Range, z: Range, name: str) -> Box:
-    ranges = (x, y, z)
-    center = tuple(0.5 * (low + high) for low, high in ranges)
-    half_extents = tuple(0.5 * (high - low) for low, high in ranges)
-    return Box(center, half_extents, name)  # type: ignore[arg-type]
-
-
 def _hook_row(centers: tuple[float, ...], y: Range, z: Range, name: str) -> list[Box]:
-    return [_box((x - 0.025, x + 0.025), y, z, name) for x in centers]
+    return [box_from_ranges((x - 0.025, x + 0.025), y, z, name) for x in centers]
 
 
 def _rope_length(links: int) -> float:

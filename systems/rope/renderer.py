@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.rope.obstacles.shapes import Array, Box, Capsule, Cylinder, Obstacle
+from systems.rope.obstacles.mjcf import geom_xml, numbers_xml
+from systems.rope.obstacles.shapes import Array, Obstacle
 from systems.rope.scene import GRIPPER_RADIUS, ROPE_RADIUS, Scene
 
 Color = tuple[float, float, float, float]
@@ -30,10 +31,11 @@ _MAX_GEOMS = 5000
 
 
 class SceneRenderer:
-    """Renders one scene as often as wanted; use it as a context manager.
+    """Renders pictures of one scene; use it as a context manager.
 
-    Without a display, MuJoCo needs ``MUJOCO_GL=egl`` (or ``osmesa``) in the environment before
-    it is first imported; here it is set to ``egl`` where neither it nor a display is.
+    Without a display, MuJoCo needs the environment variable ``MUJOCO_GL`` to be ``egl`` or
+    ``osmesa`` before it is first imported. On Linux without a display it is set to ``egl`` here,
+    unless it is set already.
 
     Parameters
     ----------
@@ -130,7 +132,10 @@ class SceneRenderer:
 
 
 def _model_xml(scene: Scene, width: int, height: int) -> str:
-    geoms = "\n".join(_geom_xml(obstacle) for obstacle in scene.obstacles)
+    geoms = "\n".join(
+        geom_xml(obstacle, f'rgba="{numbers_xml(_obstacle_color(obstacle))}"')
+        for obstacle in scene.obstacles
+    )
     high = scene.bounds[1] + (0.0, 0.0, 2.0)
     return f"""
 <mujoco>
@@ -150,31 +155,9 @@ def _model_xml(scene: Scene, width: int, height: int) -> str:
 </mujoco>"""
 
 
-def _geom_xml(obstacle: Obstacle) -> str:
-    color = f'rgba="{_numbers(_obstacle_color(obstacle))}"'
-    if isinstance(obstacle, Box):
-        place = f'pos="{_numbers(obstacle.center)}" size="{_numbers(obstacle.half_extents)}"'
-        return f'<geom type="box" {place} {color}/>'
-    if isinstance(obstacle, Capsule):
-        ends = _numbers((*obstacle.start, *obstacle.end))
-        return f'<geom type="capsule" fromto="{ends}" size="{obstacle.radius}" {color}/>'
-    ends = _numbers((*_cylinder_end(obstacle, -1.0), *_cylinder_end(obstacle, 1.0)))
-    return f'<geom type="cylinder" fromto="{ends}" size="{obstacle.radius}" {color}/>'
-
-
-def _cylinder_end(cylinder: Cylinder, side: float) -> Array:
-    end = np.array(cylinder.center)
-    end[cylinder.axis] += side * cylinder.half_length
-    return end
-
-
 def _obstacle_color(obstacle: Obstacle) -> Color:
     if "outer wall" in obstacle.name:
         return _OUTER_WALL_COLOR
     if "wall" in obstacle.name:
         return _WALL_COLOR
     return _FLOOR_COLOR if obstacle.name == "floor" else _HOOK_COLOR
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join(f"{value:.9g}" for value in values)

@@ -9,16 +9,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from systems.rope.catenary import hanging_rope
 from systems.rope.obstacles.shapes import Array, Obstacle, pack_obstacles
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.validation import as_finite_array, check_within_bounds
 
 ROPE_RADIUS = 0.01
 NODE_SPACING = 0.02
-# A gripper is a sphere around the point where it holds the rope; planners keep more away.
+# A gripper is a sphere around the point where it holds the rope. Plans keep its centre farther away
+# from obstacles than it has to be.
 GRIPPER_RADIUS = 0.023
 GRIPPER_CLEARANCE = 0.03
-# The longest displacement of both grippers together in one transition.
+# The longest displacement of both grippers together, in R^6, in one transition.
 STEP_SIZE = 0.025
 MAX_STRETCH = 1.15
 
@@ -90,61 +92,18 @@ class Scene:
         return max(3, round(self.rope_length / NODE_SPACING) + 1)
 
     @property
+    def link_length(self) -> float:
+        """Distance from node to node along the rope at rest, metres."""
+        return self.rope_length / (self.n_nodes - 1)
+
+    @property
     def max_band_length(self) -> float:
-        """Length beyond which the rope is overstretched."""
+        """Length beyond which the rope is overstretched, metres."""
         return self.max_stretch * self.rope_length
 
     def start_rope(self) -> Array:
         """Return the rope's nodes at the start, shape (n_nodes, 3)."""
         return hanging_rope(self.start, self.rope_length, self.n_nodes)
-
-
-def hanging_rope(grippers: ArrayLike, rope_length: float, n_nodes: int) -> Array:
-    """Lay a rope from gripper to gripper: a catenary, or straight where it is taut.
-
-    Parameters
-    ----------
-    grippers : array-like of shape (2, 3)
-    rope_length : float
-        Length at rest; a straight rope is stretched evenly where it is shorter.
-    n_nodes : int
-
-    Returns
-    -------
-    nodes : ndarray of shape (n_nodes, 3)
-        Evenly spaced along the rope, from gripper A to gripper B.
-    """
-    first, last = as_finite_array(grippers, "grippers", (2, 3))
-    fraction = np.linspace(0.0, 1.0, n_nodes)[:, None]
-    if np.linalg.norm(last - first) >= rope_length * (1.0 - 1e-6):
-        nodes = first + fraction * (last - first)
-        nodes[-1] = last
-        return nodes
-    across, height = _catenary(last - first, rope_length, fraction[:, 0] * rope_length)
-    nodes = first + across[:, None] * (last - first)
-    nodes[:, 2] = first[2] + height
-    nodes[-1] = last
-    return nodes
-
-
-def _catenary(span: Array, length: float, arc: Array) -> tuple[Array, Array]:
-    """Fraction of the way across, and height above the first end, at each arc length."""
-    rise = float(span[2])
-    # Ends straight above one another would leave the curve no width to be computed from.
-    width = max(float(np.hypot(span[0], span[1])), 1e-4 * length)
-    slack = np.sqrt(length**2 - rise**2) / width
-    if slack <= 1.0 + 1e-9:
-        return arc / length, arc / length * rise
-    low, high = 1e-6, 40.0
-    for _ in range(80):  # bisection for sinh(x) / x = slack
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if np.sinh(middle) < slack * middle else (low, middle)
-    scale = width / (2.0 * low)
-    left = np.arctanh(rise / length) - low
-    slope = np.sinh(left) + arc / scale
-    return (np.arcsinh(slope) - left) * scale / width, scale * (
-        np.hypot(1.0, slope) - np.cosh(left)
-    )
 
 
 def _frozen_array(values: ArrayLike, name: str) -> Array:

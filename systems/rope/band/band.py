@@ -1,7 +1,8 @@
 """The virtual elastic band: the rope pulled taut between the grippers, as a reduced state.
 
-A reduced state is a row of ``reduced_dim(scene)`` numbers: gripper A, gripper B, then the
-band's points from A to B, metres in the world frame; the last point fills what remains.
+A band is a row of ``reduced_dim(scene)`` numbers: the positions of gripper A and gripper B, then
+the band's points from A to B, in metres in the world frame. The last point is repeated until the
+row is full.
 """
 
 from __future__ import annotations
@@ -12,36 +13,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.errors import SimulationDivergedError
-from systems.rope.band.comparison_kernels import (
-    compare_rows,
-    fill_lengths,
-    fill_resampled,
-)
-from systems.rope.band.propagation_kernels import propagate_rows, reduce_points
+from systems.rope.band.comparison_kernels import compare_bands
+from systems.rope.band.propagation_kernels import IN_OBSTACLE, TOO_MANY_POINTS, reduce_curve
+from systems.rope.band.row_kernels import GRIPPERS_WIDTH, fill_lengths, fill_resampled
 from systems.rope.obstacles.shapes import Array
 from systems.rope.scene import Scene
 from systems.validation import as_finite_array
 
+# Points at which bands are compared, and the paper's α: the largest norm, in metres, of all their
+# differences together.
 N_MATCHED = 500
-# α of the paper, for a distance over 500 matched points.
 CLOSE_DISTANCE = 0.5
 
-# Two chains of points, for the kernels to work in.
-WORKSPACE_SHAPE = (2, 640, 5)
+# Points that a band may have: some for what it is bent around, and more the longer it is.
+_FEWEST_POINTS = 32
+_LENGTH_PER_POINT = 0.05
 
 
 def max_band_points(scene: Scene) -> int:
     """Return the most points that a band in this scene may have."""
-    return 32 + math.ceil(scene.max_band_length / 0.05)
+    return _FEWEST_POINTS + math.ceil(scene.max_band_length / _LENGTH_PER_POINT)
 
 
 def reduced_dim(scene: Scene) -> int:
     """Return the length of a reduced state in this scene."""
-    return 6 + 3 * max_band_points(scene)
+    return GRIPPERS_WIDTH + 3 * max_band_points(scene)
 
 
 def reduce_rope(nodes: Array, grippers: Array, scene: Scene) -> Array:
-    """Pull a rope taut within its homotopy class: the paper's r.
+    """Pull a rope taut without crossing an obstacle, within its homotopy class: the paper's r.
 
     Parameters
     ----------
@@ -65,61 +65,26 @@ def reduce_rope(nodes: Array, grippers: Array, scene: Scene) -> Array:
     """
     nodes = as_finite_array(nodes, "nodes", (None, 3))
     first, last = as_finite_array(grippers, "grippers", (2, 3))
-    points = np.vstack([first, nodes, last])
     reduced = np.empty(reduced_dim(scene))
-    code = reduce_points(points, scene.packed, np.empty(WORKSPACE_SHAPE), reduced)
-    if code == -1:
+    failure = reduce_curve(np.vstack([first, nodes, last]), scene.packed, reduced)
+    if failure == IN_OBSTACLE:
         raise SimulationDivergedError("The rope or a gripper passes through an obstacle.")
-    if code == -2:
+    if failure == TOO_MANY_POINTS:
         raise SimulationDivergedError("The rope is too entangled to be pulled taut.")
     return reduced
 
 
-def propagate_bands(
-    reduced: Array, command: Array, scene: Scene
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Move the ends of bands and let the bands contract: the paper's g.
-
-    Parameters
-    ----------
-    reduced : ndarray of shape (n, reduced_dim)
-    command : ndarray of shape (n, 6)
-        Displacements of gripper A and gripper B, metres.
-    scene : Scene
-
-    Returns
-    -------
-    next_reduced : ndarray of shape (n, reduced_dim)
-    valid : ndarray of bool of shape (n,)
-        False, with the row left as it was, where the band would be overstretched, a gripper
-        would be in collision or the band could not be linked to the grippers.
-
-    References
-    ----------
-    McConachie et al. 2020, "Reduction"; Quinlan 1994.
-    """
-    reduced = checked_bands(reduced, "reduced", scene)
-    command = np.ascontiguousarray(as_finite_array(command, "command", (len(reduced), 6)))
-    next_reduced, valid = np.empty_like(reduced), np.empty(len(reduced), dtype=np.bool_)
-    workspace = np.empty(WORKSPACE_SHAPE)
-    propagate_rows(
-        reduced, command, scene.packed, scene.max_band_length, workspace, next_reduced, valid
-    )
-    return next_reduced, valid
-
-
-def bands_close(
-    predicted: Array, executed: Array, scene: Scene, n_matched: int = N_MATCHED
-) -> NDArray[np.bool_]:
+def bands_close(predicted: Array, executed: Array, scene: Scene) -> NDArray[np.bool_]:
     """Say, row by row, whether bands are near one another and of one homotopy class: Close.
+
+    500 points at the same fractions of the bands' lengths are compared. They must be near one
+    another, 2.2 cm in root mean square, and the straight segments between them free of obstacles.
+    That is stricter than first-order homotopy, which may match points freely.
 
     Parameters
     ----------
     predicted, executed : ndarray of shape (n, reduced_dim)
     scene : Scene
-    n_matched : int
-        Points at which the bands are compared. α is scaled by sqrt(n_matched / 500), so that
-        it always means the same: 2.2 cm from point to point, in root mean square.
 
     Returns
     -------
@@ -127,51 +92,14 @@ def bands_close(
 
     References
     ----------
-    McConachie et al. 2020, "Learning the Classifier".
-    """
-    alpha = CLOSE_DISTANCE * math.sqrt(n_matched / N_MATCHED)
-    return _compare(predicted, executed, scene, n_matched, alpha)
-
-
-def same_homotopy_class(reduced: Array, others: Array, scene: Scene) -> NDArray[np.bool_]:
-    """Say, row by row, whether bands deform into one another along straight ways: FOH.
-
-    500 points at the same fractions of the length are matched, and the segments between them
-    must be free of obstacles. It is stricter than first-order homotopy, which matches them
-    freely.
-
-    Parameters
-    ----------
-    reduced, others : ndarray of shape (n, reduced_dim)
-    scene : Scene
-
-    Returns
-    -------
-    homotopic : ndarray of bool of shape (n,)
-
-    References
-    ----------
     McConachie et al. 2020, "Learning the Classifier"; Jaillet and Simeon 2008.
     """
-    return _compare(reduced, others, scene, N_MATCHED, math.inf)
-
-
-def band_distance(reduced: Array, others: Array, n_matched: int = N_MATCHED) -> Array:
-    """Euclidean norm of the differences of matched points, row by row: the paper's D.
-
-    Parameters
-    ----------
-    reduced, others : ndarray of shape (n, reduced_dim)
-    n_matched : int
-        Points, evenly spaced along each band.
-
-    Returns
-    -------
-    distances : ndarray of shape (n,)
-        Metres.
-    """
-    differences = resample_bands(reduced, n_matched) - resample_bands(others, n_matched)
-    return np.linalg.norm(differences.reshape(len(differences), -1), axis=1)
+    predicted = checked_bands(predicted, "predicted", scene)
+    executed = checked_bands(executed, "executed", scene, len(predicted))
+    close: NDArray[np.bool_] = compare_bands(
+        predicted, executed, scene.packed, N_MATCHED, CLOSE_DISTANCE
+    )
+    return close
 
 
 def resample_bands(reduced: Array, n_points: int = N_MATCHED) -> Array:
@@ -190,7 +118,7 @@ def band_length(reduced: Array) -> Array:
 
 def band_points(reduced: Array) -> Array:
     """Return the points of one band, (n_points, 3), without the repeated last one."""
-    points = reduced[6:].reshape(-1, 3)
+    points = reduced[GRIPPERS_WIDTH:].reshape(-1, 3)
     differs = (points[1:] != points[:-1]).any(axis=1)
     return points[: max(2, int(differs.nonzero()[0].max(initial=0)) + 2)]
 
@@ -210,16 +138,3 @@ def checked_bands(rows: Array, name: str, scene: Scene, n_rows: int | None = Non
     """
     # A copy is made only of rows that the kernels could not read.
     return np.ascontiguousarray(as_finite_array(rows, name, (n_rows, reduced_dim(scene))))
-
-
-def _compare(
-    reduced: Array, others: Array, scene: Scene, n_matched: int, max_distance: float
-) -> NDArray[np.bool_]:
-    reduced = checked_bands(reduced, "reduced", scene)
-    others = checked_bands(others, "others", scene)
-    if len(reduced) != len(others):
-        raise ValueError(f"Give as many bands as others, got {len(reduced)} and {len(others)}.")
-    close = np.empty(len(reduced), dtype=np.bool_)
-    workspace = np.empty((2, n_matched, 3))
-    compare_rows(reduced, others, scene.packed, max_distance**2, workspace, close)
-    return close

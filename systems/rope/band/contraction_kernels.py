@@ -1,292 +1,256 @@
-"""Compiled contraction of an elastic band.
+r"""Compiled contraction of an elastic band: pulling it taut without crossing an obstacle.
 
-A band is a polyline whose points know their distance to the obstacles. Every change of it is
-certified by bubbles, balls as large as the distance at their centre: they cover the new
-segments and the area that the old ones sweep on their way there. So a band lies in free space
-all along, cannot jump over an obstacle, and never gets longer by a change.
+The band is a chain of points (see :mod:`systems.rope.band.chain_kernels`) that is swept from end
+to end, point by point, until a sweep changes nothing. A point between its neighbours ``before``
+and ``after`` takes its turn as follows::
+
+      before           after         1. If the band may cut straight from before to after, the
+         o . . . . . . . o              point is removed.
+          \      ^      /           2. Else the point is moved along ``pull``, towards the
+           \     | pull/               straight line, as far as that shortens the band.
+            \    |    /
+             \   |   /
+              \  |  /
+                point
+                                     3. If an obstacle is in the way of one of the segments, that
+      before      [obstacle]            segment is bent around it by a new point, or
+         o-----bend---.                 4. the point slides along the obstacle instead.
+                       new----- after
+
+Every change is certified by bubbles, balls as large as the distance to the obstacles at their
+centre: they have to cover the new segments and the area that the old ones sweep on their way
+there. So a band lies in free space all along, can't jump over an obstacle, which keeps it in its
+homotopy class, and never gets longer by a change.
+
+References
+----------
+Quinlan 1994, "Real-time modification of collision-free paths".
 """
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
+from typing import Any, NamedTuple
 
 from systems.compilation import compiled
-from systems.rope.obstacles.signed_distance_kernels import (
-    distance,
-    distance_and_gradient,
-    gradient,
-    nearest_obstacle,
+from systems.rope.band.chain_kernels import (
+    CHANGED,
+    CLEARANCE,
+    FLOOR,
+    MIN_BUBBLE,
+    Point,
+    Vector,
+    apart,
+    between,
+    first_uncovered,
+    measured,
+    point_at,
+    pushed_out,
+    put,
+    size_of,
 )
+from systems.rope.obstacles.signed_distance_kernels import distance_and_gradient
 
-# Points keep the rope's radius away from obstacles, as its centre line must; segments may pass
-# more closely, so that a corner needs few points.
-CLEARANCE = 0.01
-FLOOR = 0.006
-
-_CONTACT = 1e-4  # so much farther away, a point still touches
-_STEP_FACTOR = 0.9  # of the distance to the obstacles, in one move
-_MIN_BUBBLE = 1e-3
-_MAX_BUBBLES = 2000
-_MIN_GAIN = 1e-10
-_MIN_MOVE = 5e-5
-_MARGIN = 1e-7
-_N_TRIES = 3
+_CONTACT = 1e-4  # metres beyond the clearance at which a point still touches an obstacle
+_STEP_FACTOR = 0.9  # longest move of a point, as a share of its distance to the obstacles
+_MIN_GAIN = 1e-10  # metres by which a change has to shorten the band
+_MIN_MOVE = 5e-5  # metres; shorter moves are not tried
+_N_TRIES = 3  # moves along one direction, each half as long as the one before
 _N_SLIDES = 2
-_SLIDE_FACTOR = 1.1  # more than 1 leads away from the obstacle, and is not blocked again
+_SLIDE_FACTOR = 1.1  # more than 1 leads away from the obstacle, so as not to be blocked again
+_LAST_BEFORE_POINT = 0.999  # a segment that is blocked at its end is bent a little before it
 
 
-@compiled(inline="always")
-def point_at(chain: Any, i: int) -> tuple[float, float, float, float]:
-    """Read a point and its distance; chains have rows x, y, z, distance, changed."""
-    return chain[i, 0], chain[i, 1], chain[i, 2], chain[i, 3]
+class Blockage(NamedTuple):
+    """Where the two segments at a point that moved are first not covered by bubbles."""
+
+    found: bool
+    after_point: bool  # on the segment from the point on, not on the one that leads to it
+    ratio: float  # how far along that segment
 
 
-@compiled(inline="always")
-def put(chain: Any, i: int, point: Any, changed: float) -> None:
-    """Write a point and its distance."""
-    chain[i, 0], chain[i, 1], chain[i, 2] = point[0], point[1], point[2]
-    chain[i, 3], chain[i, 4] = point[3], changed
-
-
-@compiled(inline="always")
-def apart(p: Any, q: Any) -> float:
-    """Distance between two points."""
-    x, y, z = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-    return np.sqrt(x * x + y * y + z * z)
-
-
-@compiled(inline="always")
-def between(p: Any, q: Any, ratio: float) -> tuple[float, float, float]:
-    """Point on the way from one point to another."""
-    return (
-        p[0] + ratio * (q[0] - p[0]),
-        p[1] + ratio * (q[1] - p[1]),
-        p[2] + ratio * (q[2] - p[2]),
-    )
+FREE = Blockage(False, False, 0.0)
 
 
 @compiled
-def pushed_out(place: Any, clearance: float, packed: Any) -> tuple[float, float, float, float]:
-    """Return a point with its distance, moved out of obstacles as far as asked."""
-    x, y, z = place[0], place[1], place[2]
-    d, index = nearest_obstacle(x, y, z, packed)
-    for _ in range(8):
-        if d >= clearance:
-            break
-        gx, gy, gz = gradient(x, y, z, packed[index])
-        step = clearance + _MARGIN - d
-        x, y, z = x + step * gx, y + step * gy, z + step * gz
-        d, index = nearest_obstacle(x, y, z, packed)
-    return x, y, z, d
+def find_blockage(before: Point, old: Point, new: Point, after: Point, packed: Any) -> Blockage:
+    """Say where the segments at a point that moved from ``old`` to ``new`` are blocked."""
+    motion = Vector(new.x - old.x, new.y - old.y, new.z - old.z)
+    ratio = first_uncovered(before, new, motion, 0.0, 1.0, packed)
+    if ratio >= 0.0:
+        return Blockage(True, False, min(ratio, _LAST_BEFORE_POINT))
+    ratio = first_uncovered(new, after, motion, 1.0, 0.0, packed)
+    # The sum rounds the ratio to a multiple of 2^-52, as it was rounded when the shipped models'
+    # data were collected.
+    return Blockage(ratio >= 0.0, True, (1.0 + ratio) - 1.0)
 
 
 @compiled
-def blocked_at(p: Any, q: Any, way: Any, at_p: float, at_q: float, packed: Any) -> float:
-    """Say how far along a segment its bubbles leave it uncovered; -1 if nowhere.
+def pull_of(before: Point, point: Point, after: Point, packed: Any) -> Vector:
+    """Return the displacement on which a point shortens the band most.
 
-    The segment came here by ``way`` times a number that goes from ``at_p`` to ``at_q`` along
-    it. A bubble holds the ways of all its points if it is larger by as much. Nearer than the
-    floor a segment may not get nearer still.
-    """
-    length = apart(p, q)
-    if length <= 0.0:
-        return -1.0
-    swept = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
-    slope = (at_q - at_p) / length
-    shrink = 1.0 / (1.0 + swept * abs(slope))
-    end = length - max(0.0, (q[3] - swept * at_q) * shrink)
-    t, d = 0.0, p[3]
-    for _ in range(_MAX_BUBBLES):
-        part = at_p + slope * t
-        bubble = (d - swept * part) * shrink
-        if bubble < _MIN_BUBBLE:
-            break
-        t += bubble
-        if t >= end:
-            return -1.0
-        x, y, z = between(p, q, t / length)
-        d = distance(x, y, z, packed)
-        if d < FLOOR:
-            part = at_p + slope * t
-            x, y, z = x - part * way[0], y - part * way[1], z - part * way[2]
-            if d < distance(x, y, z, packed):
-                break
-    return min(1.0, t / length)
-
-
-@compiled
-def bent_blocked_at(before: Any, old: Any, new: Any, after: Any, packed: Any) -> float:
-    """Say where the segments at a point that moved are blocked; -1 if nowhere.
-
-    Up to 1 it is on the segment before the point, from 1 on the one after it.
-    """
-    way = new[0] - old[0], new[1] - old[1], new[2] - old[2]
-    blocked = blocked_at(before, new, way, 0.0, 1.0, packed)
-    if blocked >= 0.0:
-        return min(blocked, 0.999)
-    blocked = blocked_at(new, after, way, 1.0, 0.0, packed)
-    return 1.0 + blocked if blocked >= 0.0 else -1.0
-
-
-@compiled
-def pull(before: Any, point: Any, after: Any, packed: Any) -> tuple[float, float, float]:
-    """Return the way on which a point shortens the band most, along what it touches.
-
-    It is the sum of the directions to its neighbours, as long as Newton's method makes it:
-    in free space it ends on their chord.
+    It is the sum of the directions to the point's neighbours, as long as Newton's method makes it:
+    in free space it ends on the straight line between them. At an obstacle it leads along the
+    surface.
     """
     a, b = apart(before, point), apart(point, after)
     if a <= 0.0 or b <= 0.0:
-        return 0.0, 0.0, 0.0
-    x, y, z = between(before, after, a / (a + b))
-    x, y, z = x - point[0], y - point[1], z - point[2]
-    if point[3] < CLEARANCE + _CONTACT:
-        _, gx, gy, gz = distance_and_gradient(point[0], point[1], point[2], packed)
+        return Vector(0.0, 0.0, 0.0)
+    target = between(before, after, a / (a + b))
+    x, y, z = target.x - point.x, target.y - point.y, target.z - point.z
+    if point.distance < CLEARANCE + _CONTACT:
+        _, gx, gy, gz = distance_and_gradient(point.x, point.y, point.z, packed)
         inward = min(0.0, x * gx + y * gy + z * gz)
         x, y, z = x - inward * gx, y - inward * gy, z - inward * gz
-    return x, y, z
+    return Vector(x, y, z)
 
 
 @compiled
-def removable(before: Any, point: Any, after: Any, packed: Any) -> bool:
+def removable(before: Point, point: Point, after: Point, packed: Any) -> bool:
     """Say whether the band may cut straight from one neighbour of a point to the other."""
     a, b = apart(before, point), apart(point, after)
     if a <= 0.0 or b <= 0.0:
         return True
-    x, y, z = between(before, after, a / (a + b))
-    middle = x, y, z, distance(x, y, z, packed)
-    if middle[3] < min(FLOOR, point[3]) or middle[3] - apart(point, middle) < _MIN_BUBBLE:
+    position = between(before, after, a / (a + b))
+    middle = measured(position.x, position.y, position.z, packed)
+    if middle.distance < min(FLOOR, point.distance):
         return False
-    return bent_blocked_at(before, point, middle, after, packed) < 0.0
+    if middle.distance - apart(point, middle) < MIN_BUBBLE:
+        return False
+    return not find_blockage(before, point, middle, after, packed).found
 
 
 @compiled
-def bent_segment(p: Any, q: Any, ratio: float, packed: Any) -> tuple[float, float, float, float]:
-    """Return a point of a segment, pushed out to the clearance; its distance is -1 if it cannot."""
-    place = between(p, q, ratio)
-    point = pushed_out(place, CLEARANCE, packed)
-    if point[3] >= CLEARANCE and bent_blocked_at(p, place, point, q, packed) < 0.0:
-        return point
-    return place[0], place[1], place[2], -1.0
+def bent_segment(p: Point, q: Point, ratio: float, packed: Any) -> Point:
+    """Return a point of a segment, pushed out to the clearance; its distance is -1 if it can't."""
+    old = between(p, q, ratio)
+    bend = pushed_out(old, CLEARANCE, packed)
+    unmeasured = Point(old.x, old.y, old.z, -1.0)
+    if bend.distance < CLEARANCE or find_blockage(p, unmeasured, bend, q, packed).found:
+        return unmeasured
+    return bend
 
 
 @compiled
-def moved_by(point: Any, way: Any, scale: float, packed: Any) -> tuple[float, float, float, float]:
-    """Return a point moved along a way, but not nearer to obstacles than it may be."""
-    far = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
-    if far > _STEP_FACTOR * point[3]:
-        scale *= _STEP_FACTOR * point[3] / far
-    place = point[0] + scale * way[0], point[1] + scale * way[1], point[2] + scale * way[2]
-    return pushed_out(place, min(CLEARANCE, point[3]), packed)
+def moved_by(point: Point, way: Vector, scale: float, packed: Any) -> Point:
+    """Return a point moved along ``scale * way``, but not nearer to obstacles than it may be."""
+    far = size_of(way)
+    if far > _STEP_FACTOR * point.distance:
+        scale *= _STEP_FACTOR * point.distance / far
+    target = Vector(point.x + scale * way.x, point.y + scale * way.y, point.z + scale * way.z)
+    return pushed_out(target, min(CLEARANCE, point.distance), packed)
 
 
 @compiled
 def slide(
-    before: Any, tried: Any, after: Any, way: Any, blocked: float, packed: Any
-) -> tuple[float, float, float]:
-    """Take from a way what presses a segment against the obstacle that blocks it."""
-    if blocked < 1.0:
-        x, y, z = between(before, tried, blocked)
+    before: Point, tried: Point, after: Point, way: Vector, blockage: Blockage, packed: Any
+) -> Vector:
+    """Take out of a way what presses a segment against the obstacle that blocks it."""
+    if blockage.after_point:
+        contact = between(tried, after, blockage.ratio)
     else:
-        x, y, z = between(tried, after, blocked - 1.0)
-    _, gx, gy, gz = distance_and_gradient(x, y, z, packed)
-    inward = _SLIDE_FACTOR * min(0.0, way[0] * gx + way[1] * gy + way[2] * gz)
-    return way[0] - inward * gx, way[1] - inward * gy, way[2] - inward * gz
+        contact = between(before, tried, blockage.ratio)
+    _, gx, gy, gz = distance_and_gradient(contact.x, contact.y, contact.z, packed)
+    inward = _SLIDE_FACTOR * min(0.0, way.x * gx + way.y * gy + way.z * gz)
+    return Vector(way.x - inward * gx, way.y - inward * gy, way.z - inward * gz)
 
 
 @compiled
 def bend_and_move(
-    chain: Any, n: int, point: Any, new: Any, after: Any, blocked: float, packed: Any
+    chain: Any, n: int, point: Point, new: Point, after: Point, blockage: Blockage, packed: Any
 ) -> int:
-    """Move a point one of whose segments is blocked, and bend that segment there."""
+    """Append a point that moved and a bend of the segment that is blocked.
+
+    Returns the chain's new number of points, or -1 if that does not shorten the band or is
+    blocked, too.
+    """
     before = point_at(chain, n - 1)
     length = apart(before, point) + apart(point, after) - _MIN_GAIN
-    if blocked < 1.0:
-        bend = bent_segment(before, point, blocked, packed)
-        bent = apart(before, bend) + apart(bend, new) + apart(new, after)
-        first, second, start, end = bend, new, bend, after
-    else:
-        bend = bent_segment(point, after, blocked - 1.0, packed)
+    if blockage.after_point:
+        bend = bent_segment(point, after, blockage.ratio, packed)
         bent = apart(before, new) + apart(new, bend) + apart(bend, after)
         first, second, start, end = new, bend, before, bend
-    if bend[3] < 0.0 or bent >= length:
+    else:
+        bend = bent_segment(before, point, blockage.ratio, packed)
+        bent = apart(before, bend) + apart(bend, new) + apart(new, after)
+        first, second, start, end = bend, new, bend, after
+    if bend.distance < 0.0 or bent >= length:
         return -1
-    if bent_blocked_at(start, point, new, end, packed) >= 0.0:
+    if find_blockage(start, point, new, end, packed).found:
         return -1
-    put(chain, n, first, 1.0)
-    put(chain, n + 1, second, 1.0)
+    put(chain, n, first, True)
+    put(chain, n + 1, second, True)
     return n + 2
 
 
 @compiled
 def try_way(
-    chain: Any, n: int, point: Any, after: Any, way: Any, packed: Any
-) -> tuple[int, float, Any]:
-    """Append a point moved along a way, as far as it shortens the band and is not blocked.
+    chain: Any, n: int, point: Point, after: Point, way: Vector, packed: Any
+) -> tuple[int, Blockage, Point]:
+    """Append a point moved along a way, as far as that shortens the band and is not blocked.
 
-    Returns the chain's new length or -1, where a segment was blocked last and by which move.
+    Returns the chain's new number of points, or -1 if no move will do, what blocked the last move
+    that was tried, and where that move led.
     """
     before = point_at(chain, n - 1)
     length = apart(before, point) + apart(point, after) - _MIN_GAIN
-    scale, blocked, tried = 1.0, -1.0, point
+    scale, blockage, tried = 1.0, FREE, point
     for _ in range(_N_TRIES):
         new = moved_by(point, way, scale, packed)
         scale *= 0.5
-        sweep = apart(point, new)
-        if sweep <= _MIN_MOVE:
+        if apart(point, new) <= _MIN_MOVE:
             break
-        if new[3] < min(CLEARANCE, point[3]) or apart(before, new) + apart(new, after) >= length:
+        longer = apart(before, new) + apart(new, after) >= length
+        if longer or new.distance < min(CLEARANCE, point.distance):
             continue
-        blocked, tried = bent_blocked_at(before, point, new, after, packed), new
-        if blocked < 0.0:
-            put(chain, n, new, 1.0)
-            return n + 1, blocked, tried
-    return -1, blocked, tried
+        blockage, tried = find_blockage(before, point, new, after, packed), new
+        if not blockage.found:
+            put(chain, n, new, True)
+            return n + 1, blockage, tried
+    return -1, blockage, tried
 
 
 @compiled
-def move(chain: Any, n: int, point: Any, after: Any, packed: Any) -> tuple[int, bool]:
-    """Append a point, pulled taut; return the chain's new length and whether it moved."""
+def pull_taut(chain: Any, n: int, point: Point, after: Point, packed: Any) -> tuple[int, bool]:
+    """Append a point, pulled taut; return the chain's number of points and whether it moved."""
     before = point_at(chain, n - 1)
-    way = pull(before, point, after, packed)
-    end, blocked, tried = try_way(chain, n, point, after, way, packed)
-    if end < 0 and blocked >= 0.0:
-        end = bend_and_move(chain, n, point, tried, after, blocked, packed)
+    way = pull_of(before, point, after, packed)
+    end, blockage, tried = try_way(chain, n, point, after, way, packed)
+    if end < 0 and blockage.found:
+        end = bend_and_move(chain, n, point, tried, after, blockage, packed)
     for _ in range(_N_SLIDES):
-        if end > 0 or blocked < 0.0:
+        if end > 0 or not blockage.found:
             break
-        way = slide(before, tried, after, way, blocked, packed)
-        end, blocked, tried = try_way(chain, n, point, after, way, packed)
+        way = slide(before, tried, after, way, blockage, packed)
+        end, blockage, tried = try_way(chain, n, point, after, way, packed)
     if end > 0:
         return end, True
-    put(chain, n, point, 0.0)
+    put(chain, n, point, False)
     return n + 1, False
 
 
 @compiled
 def sweep(source: Any, n: int, chain: Any, packed: Any) -> tuple[int, bool]:
-    """Contract the band once, from its last point to its first, which reverses it.
+    """Contract a band once, from its last point to its first, which reverses it.
 
-    Points whose neighbourhood did not change since their last turn are left alone.
+    Points whose neighbourhood did not change since their last turn are only copied. Returns the
+    number of points, or -1 without room for them, and whether anything changed.
     """
-    put(chain, 0, point_at(source, n - 1), 0.0)
-    m, changed_before, any_changed = 1, source[n - 1, 4] > 0.0, False
+    put(chain, 0, point_at(source, n - 1), False)
+    m, changed_before, any_changed = 1, source[n - 1, CHANGED] > 0.0, False
     for i in range(n - 2, 0, -1):
         if m + 3 > chain.shape[0]:
             return -1, False
         point, after = point_at(source, i), point_at(source, i - 1)
-        if not (changed_before or source[i, 4] > 0.0 or source[i - 1, 4] > 0.0):
-            put(chain, m, point, 0.0)
+        if not (changed_before or source[i, CHANGED] > 0.0 or source[i - 1, CHANGED] > 0.0):
+            put(chain, m, point, False)
             m += 1
         elif removable(point_at(chain, m - 1), point, after, packed):
-            chain[m - 1, 4] = 1.0
+            chain[m - 1, CHANGED] = 1.0
             changed_before, any_changed = True, True
         else:
-            m, changed_before = move(chain, m, point, after, packed)
+            m, changed_before = pull_taut(chain, m, point, after, packed)
             any_changed = any_changed or changed_before
-    put(chain, m, point_at(source, 0), 0.0)
+    put(chain, m, point_at(source, 0), False)
     return m + 1, any_changed
 
 
@@ -294,7 +258,7 @@ def sweep(source: Any, n: int, chain: Any, packed: Any) -> tuple[int, bool]:
 def contract(chain: Any, spare: Any, n: int, packed: Any, max_sweeps: int) -> int:
     """Pull a band taut in place; return its number of points, or -1 without room for them.
 
-    Sweeps come in pairs, one from either end.
+    Sweeps come in pairs, one from either end, with ``spare`` as the chain in between.
     """
     for _ in range((max_sweeps + 1) // 2):
         n, changed = sweep(chain, n, spare, packed)

@@ -1,6 +1,9 @@
-"""Features of rope transitions that see what hangs below the band."""
+"""Features of rope transitions: the obstacles between the band and where the rope may hang."""
 
 from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,40 +12,69 @@ from systems.rope.features.clearance_kernels import (
     LEAST_SPAN,
     N_COLUMNS,
     N_ROWS,
-    fill_depths,
-    fill_hanging_clearances,
-    fill_slack_clearances,
+    hanging_clearances,
+    hanging_depths,
+    pbd_clearances,
 )
 from systems.rope.obstacles.shapes import Array
 from systems.rope.scene import STEP_SIZE, Scene
 from systems.rope.slack.pbd_ropes import KINDS, pbd_dim
 from systems.validation import as_finite_array
 
-_N_CELLS = N_COLUMNS * N_ROWS
-_N_LENGTHS = 4
-_RISES = [2, 6]
-_CURTAIN = 2 * _N_LENGTHS
-_FIRST_SHEET = _CURTAIN + _N_CELLS
-_N_OFFSETS = 3 * N_COLUMNS
-_SHEETS = tuple(_FIRST_SHEET + i * (_N_CELLS + _N_OFFSETS + 1) for i in range(len(KINDS)))
+
+class PbdColumns(NamedTuple):
+    """Columns that describe one PBD rope."""
+
+    clearances: slice
+    offsets: slice
+    length: slice
+
+
+def _consecutive(start: int, *widths: int) -> list[slice]:
+    ends = np.cumsum([start, *widths]).tolist()
+    return [slice(first, end) for first, end in itertools.pairwise(ends)]
+
+
+# The columns of the features, in their order. Offsets and motions are triples: along the
+# horizontal direction from gripper A to B, to the left of it, and up.
+_N_LENGTHS, _N_CELLS, _N_OFFSETS, _N_MOTION = 4, N_COLUMNS * N_ROWS, 3 * N_COLUMNS, 3
+LENGTHS_BEFORE, LENGTHS_AFTER, HANGING = _consecutive(0, _N_LENGTHS, _N_LENGTHS, _N_CELLS)
+PBD_WIDTH = _N_CELLS + _N_OFFSETS + 1
+PBD = tuple(
+    PbdColumns(*_consecutive(HANGING.stop + i * PBD_WIDTH, _N_CELLS, _N_OFFSETS, 1))
+    for i in range(len(KINDS))
+)
+MOTION_A, MOTION_B = _consecutive(HANGING.stop + len(KINDS) * PBD_WIDTH, _N_MOTION, _N_MOTION)
+N_FEATURES = MOTION_B.stop
+# Within the lengths, and within a triple.
+SEPARATION, BAND_LENGTH, RISE, DEPTH_OF_ROPE = range(_N_LENGTHS)
+ALONG, LEFT, UP = range(3)
+
+# A triple as seen after a turn by half a circle about the vertical.
+_TURNED = (-1.0, -1.0, 1.0)
 
 
 def clearance_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array:
     """Describe transitions by the obstacles between the band and the rope that hangs below it.
 
-    The band forgets how the rope hangs, and yet the length of the rope implies it: below the
-    band, as deep as the slack lets it. What catches the rope goes through this region. Before
-    and after the transition come the distance between the grippers, the length of the band, the
-    rise from gripper A to B and the depth of the rope, as shares of the rope's length; then,
-    after it, the signed distance to the obstacles on a grid of 16 columns along the band by 8
-    rows from the band down to a little below the rope, clipped to -0.05 and 0.15 m, in units of
-    0.05 m. A rope that rests on an edge drags behind its grippers, so then come, for each PBD
-    rope (see :mod:`systems.rope.slack.pbd_ropes`), such a grid from the band towards it and beyond;
-    the way from band to PBD rope in its 16 columns, in the same units, along the horizontal
-    direction from A to B, to the left of it, and up; and its length as a share of the longest that
-    is allowed. Last comes the motion of the grippers in steps of 0.025 m: along, to the left, and
-    up. The features are the same wherever the scene is put and however it is turned about the
-    vertical.
+    The band tells nothing about how the rope hangs, but the rope's length does: it hangs below
+    the band, as deep as its slack allows. Obstacles that can catch it are in the region between.
+    The features are, in this order:
+
+    - 4 before and 4 after the transition, as shares of the rope's length: the distance between
+      the grippers, the length of the band, the rise from gripper A to B, and the depth to which
+      the rope hangs;
+    - 128, the signed distances to the obstacles, after the transition, on a grid of 16 columns
+      along the band by 8 rows from the band down to a little below the rope, clipped to -0.05 and
+      0.15 m, in units of 0.05 m;
+    - 177 for each of the two PBD ropes (:mod:`systems.rope.slack.pbd_ropes`), which also know
+      where the rope rests on an edge and drags behind its grippers: 128 such distances on a grid
+      from the band towards the PBD rope and a little beyond; the offset from the band to it in
+      each of the 16 columns, in the same units, along the horizontal direction from A to B, to
+      the left of it, and up; and its length as a share of the longest that is allowed;
+    - 6, the motion of gripper A and of gripper B in steps of 0.025 m: along, to the left, and up.
+
+    They are the same wherever the scene is put and however it is turned about the vertical.
 
     Parameters
     ----------
@@ -55,46 +87,50 @@ def clearance_features(reduced: Array, next_reduced: Array, scene: Scene) -> Arr
     X : ndarray of float32 of shape (n, 496)
     """
     before, _ = _checked_parts(reduced, "reduced", scene)
-    after, loose = _checked_parts(next_reduced, "next_reduced", scene, len(before))
-    curtains, depths = np.empty((len(after), N_COLUMNS, N_ROWS)), np.empty((2, len(after)))
-    fill_depths(before, scene.rope_length, depths[0])
-    fill_hanging_clearances(after, scene.packed, scene.rope_length, curtains, depths[1])
-    rows = [
-        _lengths(before, depths[0], scene),
-        _lengths(after, depths[1], scene),
-        curtains.reshape(len(after), _N_CELLS),
-        _sheets(after, loose, scene),
+    after, ropes = _checked_parts(next_reduced, "next_reduced", scene, len(before))
+    hanging, depths = hanging_clearances(after, scene.packed, scene.rope_length)
+    parts = [
+        _lengths(before, hanging_depths(before, scene.rope_length), scene),
+        _lengths(after, depths, scene),
+        hanging.reshape(len(after), _N_CELLS),
+        _pbd_parts(after, ropes, scene),
         _motion(before, after),
     ]
-    return np.hstack(rows).astype(np.float32)
+    return np.hstack(parts).astype(np.float32)
 
 
 def mirrored(features: Array) -> Array:
-    """Return the features of the same transitions in a mirror that stands along the rope."""
+    """Return the features of the same transitions in a vertical mirror through the grippers."""
     image = features.copy()
-    for offsets in map(_offsets, _SHEETS):
-        image[:, offsets][:, 1::3] *= -1.0
-    image[:, [-5, -2]] *= -1.0
+    for columns in (*(pbd.offsets for pbd in PBD), MOTION_A, MOTION_B):
+        _triples(image, columns)[:, :, LEFT] *= -1.0
     return image
 
 
 def reversed_ends(features: Array) -> Array:
     """Return the features of the same transitions with the names of the grippers exchanged."""
     image = features.copy()
-    for first in (_CURTAIN, *_SHEETS):
-        cells = image[:, first : first + _N_CELLS].reshape(-1, N_COLUMNS, N_ROWS)
-        image[:, first : first + _N_CELLS] = cells[:, ::-1].reshape(-1, _N_CELLS)
-    image[:, _RISES] *= -1.0
-    turned = np.array([-1.0, -1.0, 1.0], dtype=features.dtype)
-    for offsets in map(_offsets, _SHEETS):
-        ways = features[:, offsets].reshape(-1, N_COLUMNS, 3)
-        image[:, offsets] = (ways[:, ::-1] * turned).reshape(-1, _N_OFFSETS)
-    image[:, -6:-3], image[:, -3:] = features[:, -3:] * turned, features[:, -6:-3] * turned
+    for lengths in (LENGTHS_BEFORE, LENGTHS_AFTER):
+        image[:, lengths][:, RISE] *= -1.0
+    for cells in (HANGING, *(pbd.clearances for pbd in PBD)):
+        image[:, cells] = _grid(features, cells)[:, ::-1].reshape(-1, _N_CELLS)
+    turned = np.array(_TURNED, dtype=features.dtype)
+    for columns in (pbd.offsets for pbd in PBD):
+        offsets = _triples(features, columns)[:, ::-1] * turned
+        image[:, columns] = offsets.reshape(-1, _N_OFFSETS)
+    image[:, MOTION_A] = features[:, MOTION_B] * turned
+    image[:, MOTION_B] = features[:, MOTION_A] * turned
     return image
 
 
-def _offsets(sheet: int) -> slice:
-    return slice(sheet + _N_CELLS, sheet + _N_CELLS + _N_OFFSETS)
+def _grid(features: Array, cells: slice) -> Array:
+    return features[:, cells].reshape(-1, N_COLUMNS, N_ROWS)
+
+
+def _triples(features: Array, columns: slice) -> Array:
+    """Return a view of triples, shape (n, n_triples, 3)."""
+    n_triples = (columns.stop - columns.start) // 3
+    return features[:, columns].reshape(len(features), n_triples, 3)
 
 
 def _checked_parts(
@@ -112,19 +148,21 @@ def _lengths(bands: Array, depths: Array, scene: Scene) -> Array:
     return lengths / scene.rope_length
 
 
-def _sheets(bands: Array, loose: Array, scene: Scene) -> Array:
-    """Return the distances between bands and PBD ropes, the ways, and the ropes' lengths."""
-    shape = (len(bands), len(KINDS))
-    sheets, offsets = np.empty((*shape, N_COLUMNS, N_ROWS)), np.empty((*shape, N_COLUMNS, 3))
-    lengths, ropes = np.empty(shape), loose.reshape(*shape, loose.shape[1] // len(KINDS))
-    fill_slack_clearances(bands, ropes, scene.n_nodes, scene.packed, sheets, offsets, lengths)
-    flat = sheets.reshape(*shape, _N_CELLS), offsets.reshape(*shape, _N_OFFSETS)
-    parts = np.concatenate([*flat, lengths[..., None] / scene.max_band_length], axis=2)
-    return parts.reshape(len(bands), len(KINDS) * (_N_CELLS + _N_OFFSETS + 1))
+def _pbd_parts(bands: Array, ropes: Array, scene: Scene) -> Array:
+    """Return clearances, offsets and lengths of PBD ropes, shape (n, n_ropes * PBD_WIDTH)."""
+    n, n_ropes = len(bands), len(KINDS)
+    separate = ropes.reshape(n, n_ropes, ropes.shape[1] // n_ropes)
+    clearances, offsets, lengths = pbd_clearances(bands, separate, scene.n_nodes, scene.packed)
+    parts = [
+        clearances.reshape(n, n_ropes, _N_CELLS),
+        offsets.reshape(n, n_ropes, _N_OFFSETS),
+        lengths[..., None] / scene.max_band_length,
+    ]
+    return np.concatenate(parts, axis=2).reshape(n, n_ropes * PBD_WIDTH)
 
 
 def _motion(before: Array, after: Array) -> Array:
-    """Displacements of A and B along, across and up, shape (n, 6)."""
+    """Displacements of A and B along, to the left and up, in steps, shape (n, 6)."""
     span = before[:, 3:5] - before[:, :2]
     length = np.linalg.norm(span, axis=1, keepdims=True)
     along = np.where(length > LEAST_SPAN, span / np.maximum(length, LEAST_SPAN), [1.0, 0.0])

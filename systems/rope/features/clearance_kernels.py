@@ -1,4 +1,13 @@
-"""Compiled features of the rope: how near obstacles are to what hangs below the band."""
+"""Compiled features of the rope: how near obstacles are below the band, and at the PBD ropes.
+
+Distances are sampled on grids of ``N_COLUMNS`` columns, evenly spaced along the band, by
+``N_ROWS`` rows from the band towards where the rope may be, and a little farther::
+
+       A o==+===+===+===+==o B    the band
+         .  |   |   |   |  .
+          . |   |   |   | .       the rope: a parabola of its length, or a PBD rope
+            `   +   +   '
+"""
 
 from __future__ import annotations
 
@@ -7,107 +16,106 @@ from typing import Any
 import numpy as np
 
 from systems.compilation import compiled
-from systems.rope.band.propagation_kernels import n_points
-from systems.rope.features.component_kernels import LEAST_WIDTH, parabola_bend
-from systems.rope.kernels import length_between
+from systems.rope.band.row_kernels import fill_points_along, length_of_band
+from systems.rope.features.parabola_kernels import LEAST_WIDTH, parabola_bend
 from systems.rope.obstacles.signed_distance_kernels import distance
+from systems.rope.rope_length import length_between
 
 N_COLUMNS = 16
 N_ROWS = 8
-# The lowest row is deeper than the rope hangs by this factor.
+# The lowest row is farther from the band than the rope is, by this factor.
 DEPTH = 1.2
-# Distances beyond these, in metres, are all the same to a rope.
+# Distances are clipped to these limits, beyond which they do not matter to a rope, in metres; they
+# are given in units.
 NEAREST, FARTHEST, UNIT = -0.05, 0.15, 0.05
-# Grippers that are nearer, in metres and seen from above, give no direction.
+# Grippers nearer to one another than this, in metres and seen from above, give no direction.
 LEAST_SPAN = 1e-6
 
 
 @compiled
-def segment_length(row: Any, i: int, flat: bool) -> float:
-    """Length of a band's segment from point ``i``, or of its shadow on a flat floor."""
-    first = 6 + 3 * i
-    x, y = row[first + 3] - row[first], row[first + 4] - row[first + 1]
-    shadow = np.sqrt(x * x + y * y)
-    if flat:
-        return shadow
-    rise = row[first + 5] - row[first + 2]
-    return np.sqrt(shadow**2 + rise * rise)
-
-
-@compiled
-def length_of(row: Any, flat: bool) -> float:
-    """Length of a band, or of its shadow."""
-    total = 0.0
-    for i in range(n_points(row) - 1):
-        total += segment_length(row, i, flat)
-    return total
-
-
-@compiled
-def fill_band_points(row: Any, length: float, flat: bool, tops: Any) -> None:
-    """Write the points of a band that columns hang from: evenly along it, or along its shadow."""
-    n = n_points(row)
-    i, travelled, segment = 0, 0.0, segment_length(row, 0, flat)
-    for column in range(N_COLUMNS):
-        at = (column + 0.5) / N_COLUMNS
-        while i < n - 2 and travelled + segment < at * length:
-            travelled += segment
-            i += 1
-            segment = segment_length(row, i, flat)
-        ratio = (at * length - travelled) / segment if segment > 1e-12 else at
-        ratio, first = min(1.0, max(0.0, ratio)), 6 + 3 * i
-        for k in range(3):
-            tops[column, k] = row[first + k] + ratio * (row[first + 3 + k] - row[first + k])
-
-
-@compiled
 def clipped_distance(x: float, y: float, z: float, packed: Any) -> float:
-    """Distance to the obstacles in units, where it matters."""
+    """Distance to the obstacles, clipped, in units."""
     return min(FARTHEST, max(NEAREST, distance(x, y, z, packed))) / UNIT
 
 
 @compiled
-def hanging(row: Any, shadow: float, rope_length: float) -> tuple[float, float]:
-    """Return the width and the bend of the parabola that the rope would hang in."""
-    width, rise = max(shadow, LEAST_WIDTH), row[5] - row[2]
+def hanging_parabola(band: Any, span: float, rope_length: float) -> tuple[float, float]:
+    """Return the width and the bend of the parabola in which the rope would hang.
+
+    ``span`` is the length of the band seen from above. The parabola is that of a rope that hangs
+    freely after the band was straightened in a vertical plane.
+    """
+    width, rise = max(span, LEAST_WIDTH), band[5] - band[2]
     if rope_length * rope_length > width * width + rise * rise:
         return width, parabola_bend(width, rise, rope_length)
     return width, 0.0
 
 
 @compiled
-def fill_depths(rows: Any, rope_length: float, depths: Any) -> None:
-    """Write how deep the rope of each row hangs."""
-    for i in range(rows.shape[0]):
-        shadow = length_of(rows[i], True)
-        width, bend = hanging(rows[i], shadow, rope_length)
+def hanging_depths(bands: Any, rope_length: float) -> Any:
+    """Return how deep below each band the rope would hang, metres, shape (n,)."""
+    depths = np.empty(bands.shape[0])
+    for i in range(bands.shape[0]):
+        width, bend = hanging_parabola(bands[i], length_of_band(bands[i], True), rope_length)
         depths[i] = 0.25 * bend * width * width
+    return depths
 
 
 @compiled
-def fill_hanging_clearance(row: Any, packed: Any, rope_length: float, tops: Any, out: Any) -> float:
-    """Write distances on a grid that hangs from a band; return how deep the rope hangs.
+def fill_hanging_clearance(
+    band: Any, packed: Any, rope_length: float, points: Any, clearances: Any
+) -> float:
+    """Write distances on a grid straight below a band; return how deep the rope hangs.
 
-    Columns are evenly spaced along the band's shadow. The rope hangs by the parabola that it
-    would hang in if the band were straightened in a vertical plane.
+    Columns are evenly spaced along the band seen from above, and start at ``points``, which are
+    written too.
     """
-    shadow = length_of(row, True)
-    width, bend = hanging(row, shadow, rope_length)
-    fill_band_points(row, shadow, True, tops)
+    span = length_of_band(band, True)
+    width, bend = hanging_parabola(band, span, rope_length)
+    fill_points_along(band, 0.5, span / N_COLUMNS, True, points)
     for column in range(N_COLUMNS):
         at = (column + 0.5) / N_COLUMNS
-        px, py, pz = tops[column, 0], tops[column, 1], tops[column, 2]
+        x, y, z = points[column, 0], points[column, 1], points[column, 2]
         sag = bend * width * width * at * (1.0 - at)
-        for j in range(N_ROWS):
-            down = DEPTH * sag * (j + 1) / N_ROWS
-            out[column, j] = clipped_distance(px, py, pz - down, packed)
+        for row in range(N_ROWS):
+            down = DEPTH * sag * (row + 1) / N_ROWS
+            clearances[column, row] = clipped_distance(x, y, z - down, packed)
     return 0.25 * bend * width * width
 
 
 @compiled
-def direction(row: Any) -> tuple[float, float]:
+def hanging_clearances(bands: Any, packed: Any, rope_length: float) -> tuple[Any, Any]:
+    """Return distances to the obstacles between each band and the rope that hangs below it.
+
+    Parameters
+    ----------
+    bands : ndarray of shape (n, reduced_dim)
+    packed : ndarray of shape (n_obstacles, 8)
+    rope_length : float
+        At rest, metres.
+
+    Returns
+    -------
+    clearances : ndarray of shape (n, N_COLUMNS, N_ROWS)
+        Clipped, in units of 0.05 m.
+    depths : ndarray of shape (n,)
+        How deep the rope hangs, metres.
+    """
+    n = bands.shape[0]
+    clearances, depths, points = (
+        np.empty((n, N_COLUMNS, N_ROWS)),
+        np.empty(n),
+        np.empty((N_COLUMNS, 3)),
+    )
+    for i in range(n):
+        depths[i] = fill_hanging_clearance(bands[i], packed, rope_length, points, clearances[i])
+    return clearances, depths
+
+
+@compiled
+def direction(band: Any) -> tuple[float, float]:
     """Return the horizontal direction from gripper A to gripper B."""
-    x, y = row[3] - row[0], row[4] - row[1]
+    x, y = band[3] - band[0], band[4] - band[1]
     length = np.sqrt(x * x + y * y)
     if length > LEAST_SPAN:
         return x / length, y / length
@@ -115,19 +123,19 @@ def direction(row: Any) -> tuple[float, float]:
 
 
 @compiled
-def fill_slack_clearance(
-    row: Any, nodes: Any, packed: Any, tops: Any, sheet: Any, offsets: Any
+def fill_pbd_clearance(
+    band: Any, nodes: Any, packed: Any, points: Any, clearances: Any, offsets: Any
 ) -> None:
-    """Write distances on a grid from a band to a PBD rope, and the way from one to the other.
+    """Write distances on a grid from a band to a PBD rope, and the ways from one to the other.
 
-    Columns match points at the same shares of the lengths; ``tops`` are the band's. Offsets are
-    along the way from A to B, to the left of it, and up.
+    Columns run from points of the band to the points of the PBD rope at the same shares of their
+    lengths. Offsets are along the direction from A to B, to the left of it, and up.
     """
     last = nodes.shape[0] - 1
-    along_x, along_y = direction(row)
+    along_x, along_y = direction(band)
     for column in range(N_COLUMNS):
         at = (column + 0.5) / N_COLUMNS
-        px, py, pz = tops[column, 0], tops[column, 1], tops[column, 2]
+        px, py, pz = points[column, 0], points[column, 1], points[column, 2]
         node = min(last - 1, int(at * last))
         share = at * last - node
         x = nodes[node, 0] + share * (nodes[node + 1, 0] - nodes[node, 0]) - px
@@ -136,31 +144,51 @@ def fill_slack_clearance(
         offsets[column, 0] = (x * along_x + y * along_y) / UNIT
         offsets[column, 1] = (y * along_x - x * along_y) / UNIT
         offsets[column, 2] = z / UNIT
-        for j in range(N_ROWS):
-            away = DEPTH * (j + 1) / N_ROWS
-            sheet[column, j] = clipped_distance(px + away * x, py + away * y, pz + away * z, packed)
+        for row in range(N_ROWS):
+            away = DEPTH * (row + 1) / N_ROWS
+            clearances[column, row] = clipped_distance(
+                px + away * x, py + away * y, pz + away * z, packed
+            )
 
 
 @compiled
-def fill_hanging_clearances(
-    rows: Any, packed: Any, rope_length: float, out: Any, depths: Any
-) -> None:
-    """Write the curtain of each row, and how deep its rope hangs."""
-    tops = np.empty((N_COLUMNS, 3))
-    for i in range(rows.shape[0]):
-        depths[i] = fill_hanging_clearance(rows[i], packed, rope_length, tops, out[i])
+def pbd_clearances(bands: Any, ropes: Any, n_nodes: int, packed: Any) -> tuple[Any, Any, Any]:
+    """Return distances to the obstacles between bands and PBD ropes, and where the latter are.
 
+    Parameters
+    ----------
+    bands : ndarray of shape (n, reduced_dim)
+    ropes : ndarray of shape (n, n_ropes, 6 * (n_nodes - 2))
+    n_nodes : int
+        Nodes of each rope, with both ends.
+    packed : ndarray of shape (n_obstacles, 8)
 
-@compiled
-def fill_slack_clearances(
-    bands: Any, ropes: Any, n_nodes: int, packed: Any, sheets: Any, offsets: Any, lengths: Any
-) -> None:
-    """Write what :func:`fill_slack_clearance` does of each row's ropes, and their lengths."""
-    nodes, tops = np.empty((n_nodes, 3)), np.empty((N_COLUMNS, 3))
-    for i in range(bands.shape[0]):
-        nodes[0], nodes[-1] = bands[i, :3], bands[i, 3:6]
-        fill_band_points(bands[i], length_of(bands[i], False), False, tops)
-        for r in range(ropes.shape[1]):
+    Returns
+    -------
+    clearances : ndarray of shape (n, n_ropes, N_COLUMNS, N_ROWS)
+        Clipped, in units of 0.05 m.
+    offsets : ndarray of shape (n, n_ropes, N_COLUMNS, 3)
+        From band to PBD rope, in units of 0.05 m: along the direction from A to B, to the left of
+        it, and up.
+    lengths : ndarray of shape (n, n_ropes)
+        Of the PBD ropes, metres.
+    """
+    n, n_ropes = ropes.shape[:2]
+    clearances, offsets = (
+        np.empty((n, n_ropes, N_COLUMNS, N_ROWS)),
+        np.empty((n, n_ropes, N_COLUMNS, 3)),
+    )
+    lengths, nodes, points = (
+        np.empty((n, n_ropes)),
+        np.empty((n_nodes, 3)),
+        np.empty((N_COLUMNS, 3)),
+    )
+    for i in range(n):
+        band = bands[i]
+        nodes[0], nodes[-1] = band[:3], band[3:6]
+        fill_points_along(band, 0.5, length_of_band(band, False) / N_COLUMNS, False, points)
+        for r in range(n_ropes):
             nodes[1:-1] = ropes[i, r, : 3 * (n_nodes - 2)].reshape(-1, 3)
-            fill_slack_clearance(bands[i], nodes, packed, tops, sheets[i, r], offsets[i, r])
+            fill_pbd_clearance(band, nodes, packed, points, clearances[i, r], offsets[i, r])
             lengths[i, r] = length_between(nodes[:: n_nodes - 1], nodes[1:-1])
+    return clearances, offsets, lengths

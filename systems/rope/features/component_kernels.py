@@ -1,4 +1,4 @@
-"""Compiled features of the rope: what lies between the grippers and a rope hanging there."""
+"""Compiled count of the connected parts of the vertical region in which the rope may hang."""
 
 from __future__ import annotations
 
@@ -7,50 +7,25 @@ from typing import Any
 import numpy as np
 
 from systems.compilation import compiled
+from systems.rope.features.parabola_kernels import CELL, LEAST_WIDTH, parabola_bend
 from systems.rope.obstacles.signed_distance_kernels import distance
 
-CELL = 0.0125
-# Narrower than this, the hanging rope's two halves would share their cells.
-LEAST_WIDTH = 2 * CELL
-
-_OUTSIDE, _OCCUPIED, _FREE, _SEEN = 0, 1, 2, 3
-_BISECTIONS = 60
+_OCCUPIED, _FREE, _SEEN = 1, 2, 3
+# Grippers nearer to one another than this, in metres and seen from above, give no direction.
+_LEAST_SPAN = 1e-9
 
 
 @compiled
-def parabola_length(bend: float, width: float, rise: float) -> float:
-    """Arc length of rise/width * s - bend * s * (width - s), for s from 0 to ``width``."""
-    start, end = rise / width - bend * width, rise / width + bend * width
-    if bend * width < 1e-9:
-        return np.sqrt(width * width + rise * rise)
-    at_start = start * np.sqrt(1.0 + start * start) + np.arcsinh(start)
-    at_end = end * np.sqrt(1.0 + end * end) + np.arcsinh(end)
-    return (at_end - at_start) / (4.0 * bend)
+def fill_region(row: Any, packed: Any, length: float, cells: Any) -> tuple[int, int]:
+    """Mark the cells between the straight line and the hanging parabola as free or occupied.
 
-
-@compiled
-def parabola_bend(width: float, rise: float, length: float) -> float:
-    """Bend of the parabola whose arc has a length; 0 where even the chord is longer."""
-    low, high = 0.0, 4.0 * (length + abs(rise)) / (width * width)
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        if parabola_length(middle, width, rise) < length:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-@compiled
-def fill_slice(row: Any, packed: Any, length: float, cells: Any) -> tuple[int, int]:
-    """Mark the cells of the vertical slice between chord and parabola as free or occupied.
-
-    Cells beyond them, and a frame of one cell around, are occupied. Returns the numbers of
-    columns and rows.
+    The cells lie in the vertical plane through the grippers. Those above the line or below the
+    parabola, and a frame one cell wide around, are occupied. Returns the numbers of columns and
+    rows.
     """
     ux, uy = row[3] - row[0], row[4] - row[1]
     apart = np.sqrt(ux * ux + uy * uy)
-    if apart > 1e-9:
+    if apart > _LEAST_SPAN:
         ux, uy = ux / apart, uy / apart
     else:
         ux, uy = 1.0, 0.0
@@ -74,7 +49,7 @@ def fill_slice(row: Any, packed: Any, length: float, cells: Any) -> tuple[int, i
                 if alike == 0:
                     d = distance(x, y, row[2] + z, packed)
                     kind = _FREE if d > 0.0 else _OCCUPIED
-                    # No cell that is nearer than the surface is of the other kind.
+                    # Cells that are nearer than the surface are of the same kind.
                     alike = 1 + max(0, int(abs(d) / CELL - 1e-6))
                 cells[i, j] = kind
                 alike -= 1
@@ -83,7 +58,7 @@ def fill_slice(row: Any, packed: Any, length: float, cells: Any) -> tuple[int, i
 
 @compiled
 def count_components(cells: Any, n: int, m: int, stack: Any) -> tuple[int, int]:
-    """Count the connected parts that are free and occupied, and mark their cells as seen."""
+    """Count the connected free and occupied parts, marking their cells as seen."""
     n_free, n_occupied = 0, 0
     for i in range(n):
         for j in range(m):
@@ -106,10 +81,25 @@ def count_components(cells: Any, n: int, m: int, stack: Any) -> tuple[int, int]:
 
 
 @compiled
-def fill_components(
-    rows: Any, packed: Any, length: float, cells: Any, stack: Any, out: Any
-) -> None:
-    """Write the numbers of free and occupied parts of each row's slice."""
-    for i in range(rows.shape[0]):
-        n, m = fill_slice(rows[i], packed, length, cells)
-        out[i, 0], out[i, 1] = count_components(cells, n, m, stack)
+def component_counts(bands: Any, packed: Any, length: float, side: int) -> Any:
+    """Count the free and the occupied parts below each band's grippers.
+
+    Parameters
+    ----------
+    bands : ndarray of shape (n, reduced_dim)
+    packed : ndarray of shape (n_obstacles, 8)
+    length : float
+        Of the rope that hangs between the grippers, metres.
+    side : int
+        Cells along the largest region that there may be, in either direction.
+
+    Returns
+    -------
+    counts : ndarray of shape (n, 2)
+    """
+    counts = np.empty((bands.shape[0], 2))
+    cells, stack = np.empty((side, side), np.uint8), np.empty(side * side, np.int64)
+    for i in range(bands.shape[0]):
+        n, m = fill_region(bands[i], packed, length, cells)
+        counts[i, 0], counts[i, 1] = count_components(cells, n, m, stack)
+    return counts

@@ -1,4 +1,4 @@
-"""How many parts obstacles make of the slice in which the rope would hang."""
+"""Into how many parts obstacles divide the region in which the rope may hang."""
 
 from __future__ import annotations
 
@@ -6,16 +6,18 @@ import math
 
 import numpy as np
 
-from systems.rope.features.component_kernels import CELL, fill_components
+from systems.rope.features.component_kernels import component_counts
+from systems.rope.features.parabola_kernels import CELL
 from systems.rope.obstacles.shapes import Array
 from systems.rope.scene import Scene
 
 
-def slice_counts(before: Array, after: Array, scene: Scene) -> Array:
-    """Count the connected parts of a vertical slice below each pair of grippers.
+def component_features(before: Array, after: Array, scene: Scene) -> Array:
+    """Count the connected parts of a vertical region below each pair of grippers.
 
-    The slice lies between the straight line from gripper to gripper and the parabola, as long as
-    the rope may be, that hangs from it. A hook that could catch the rope is a part of its own.
+    The region lies between the straight line from gripper to gripper and a parabola that is as
+    long as the rope may become. An obstacle that the rope could be hanging around is an occupied
+    part of its own.
 
     Parameters
     ----------
@@ -25,11 +27,12 @@ def slice_counts(before: Array, after: Array, scene: Scene) -> Array:
     Returns
     -------
     counts : ndarray of shape (n, 9)
-        Before, after and their difference: of all parts, of the free, and of the occupied.
+        The number of all parts before, after, and its change; then that of the free parts, then
+        that of the occupied parts.
 
     References
     ----------
-    The slice is that of the authors' public code.
+    The region is that of the public code of McConachie et al. 2020.
     """
     parts, next_parts = _parts(before, scene), _parts(after, scene)
     triples = np.stack([parts, next_parts, next_parts - parts], axis=2)
@@ -37,9 +40,7 @@ def slice_counts(before: Array, after: Array, scene: Scene) -> Array:
 
 
 def _parts(rows: Array, scene: Scene) -> Array:
-    """Count all, the free and the occupied parts of each row's slice, shape (n, 3)."""
+    """Count all, the free and the occupied parts of each row's region, shape (n, 3)."""
     side = math.ceil(1.5 * scene.max_band_length / CELL) + 8
-    cells, stack = np.empty((side, side), np.uint8), np.empty(side * side, np.int64)
-    counts = np.empty((len(rows), 2))
-    fill_components(rows, scene.packed, scene.max_band_length, cells, stack, counts)
+    counts = component_counts(rows, scene.packed, scene.max_band_length, side)
     return np.column_stack([counts.sum(axis=1), counts])

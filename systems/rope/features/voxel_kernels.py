@@ -1,4 +1,8 @@
-"""Compiled voxel grids of rope transitions: the surroundings, and the band before and after."""
+"""Compiled voxel grids of rope transitions: the surroundings, and the band before and after.
+
+A grid has SIDE cells along each axis. While the surroundings are filled in, a column of cells along
+z is one number of SIDE bits, of which the highest is the lowest cell.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +11,29 @@ from typing import Any
 import numpy as np
 
 from systems.compilation import compiled
-from systems.rope.band.comparison_kernels import resample_row
+from systems.rope.band.row_kernels import resample_row
+from systems.rope.obstacles.shapes import (
+    AXIS,
+    BOX,
+    CORE_X,
+    CORE_Y,
+    CORE_Z,
+    CYLINDER,
+    HALF_LENGTH,
+    HALF_X,
+    HALF_Y,
+    HALF_Z,
+    KIND,
+    RADIUS,
+    X,
+    Y,
+    Z,
+)
 from systems.rope.obstacles.signed_distance_kernels import EMPTY, capsule_distance
 
 SIDE = 32
 
-# A column of cells along z is one number; the lowest cell is its highest bit.
+# The lowest cell of a column, no cell, and all of them.
 _TOP = np.uint32(1 << (SIDE - 1))
 _NONE, _ALL = np.uint32(0), np.uint32(0xFFFFFFFF)
 
@@ -57,9 +78,9 @@ def fill_outside(centers: Any, bounds: Any, columns: Any) -> None:
 @compiled
 def add_box(centers: Any, row: Any, columns: Any) -> None:
     """Occupy the cells whose centres lie in a box."""
-    i0, i1 = index_range(centers[0], row[1], row[4])
-    j0, j1 = index_range(centers[1], row[2], row[5])
-    k0, k1 = index_range(centers[2], row[3], row[6])
+    i0, i1 = index_range(centers[0], row[X], row[HALF_X])
+    j0, j1 = index_range(centers[1], row[Y], row[HALF_Y])
+    k0, k1 = index_range(centers[2], row[Z], row[HALF_Z])
     mark = column(k0, k1)
     if mark != _NONE:
         for i in range(i0, i1):
@@ -70,16 +91,16 @@ def add_box(centers: Any, row: Any, columns: Any) -> None:
 @compiled
 def add_cylinder(centers: Any, row: Any, columns: Any) -> None:
     """Occupy the cells whose centres lie in a cylinder along an axis."""
-    axis, radius = int(row[4]), row[7]
-    i0, i1 = index_range(centers[0], row[1], row[5] if axis == 0 else radius)
-    j0, j1 = index_range(centers[1], row[2], row[5] if axis == 1 else radius)
-    k0, k1 = index_range(centers[2], row[3], row[5] if axis == 2 else radius)
+    axis, radius = int(row[AXIS]), row[RADIUS]
+    i0, i1 = index_range(centers[0], row[X], row[HALF_LENGTH] if axis == 0 else radius)
+    j0, j1 = index_range(centers[1], row[Y], row[HALF_LENGTH] if axis == 1 else radius)
+    k0, k1 = index_range(centers[2], row[Z], row[HALF_LENGTH] if axis == 2 else radius)
     for i in range(i0, i1):
-        u = 0.0 if axis == 0 else centers[0, i] - row[1]
+        u = 0.0 if axis == 0 else centers[0, i] - row[X]
         for j in range(j0, j1):
-            v = 0.0 if axis == 1 else centers[1, j] - row[2]
+            v = 0.0 if axis == 1 else centers[1, j] - row[Y]
             for k in range(k0, k1):
-                w = 0.0 if axis == 2 else centers[2, k] - row[3]
+                w = 0.0 if axis == 2 else centers[2, k] - row[Z]
                 if np.sqrt(u * u + v * v + w * w) - radius <= 0.0:
                     columns[i, j] |= _TOP >> np.uint32(k)
 
@@ -87,10 +108,10 @@ def add_cylinder(centers: Any, row: Any, columns: Any) -> None:
 @compiled
 def add_capsule(centers: Any, row: Any, columns: Any) -> None:
     """Occupy the cells whose centres lie in a capsule."""
-    reach = row[7] * (1.0 + 1e-9)  # Rounding must not lose the cells at its ends.
-    i0, i1 = index_range(centers[0], row[1] + 0.5 * row[4], 0.5 * abs(row[4]) + reach)
-    j0, j1 = index_range(centers[1], row[2] + 0.5 * row[5], 0.5 * abs(row[5]) + reach)
-    k0, k1 = index_range(centers[2], row[3] + 0.5 * row[6], 0.5 * abs(row[6]) + reach)
+    reach = row[RADIUS] * (1.0 + 1e-9)  # Rounding must not lose the cells at its ends.
+    i0, i1 = index_range(centers[0], row[X] + 0.5 * row[CORE_X], 0.5 * abs(row[CORE_X]) + reach)
+    j0, j1 = index_range(centers[1], row[Y] + 0.5 * row[CORE_Y], 0.5 * abs(row[CORE_Y]) + reach)
+    k0, k1 = index_range(centers[2], row[Z] + 0.5 * row[CORE_Z], 0.5 * abs(row[CORE_Z]) + reach)
     for i in range(i0, i1):
         for j in range(j0, j1):
             for k in range(k0, k1):
@@ -105,9 +126,9 @@ def fill_surroundings(centers: Any, bounds: Any, packed: Any, columns: Any) -> N
     fill_outside(centers, bounds, columns)
     for index in range(packed.shape[0]):
         row = packed[index]
-        if row[0] == 0.0:
+        if row[KIND] == BOX:
             add_box(centers, row, columns)
-        elif row[0] == 1.0:
+        elif row[KIND] == CYLINDER:
             add_cylinder(centers, row, columns)
         else:
             add_capsule(centers, row, columns)
@@ -140,30 +161,42 @@ def write_columns(columns: Any, cells: Any) -> None:
 
 
 @compiled
-def fill_voxels(
-    rows: Any,
-    next_rows: Any,
-    packed: Any,
-    bounds: Any,
-    side: float,
-    n_points: int,
-    out: Any,
-) -> None:
-    """Write each transition's three grids, bit by bit, to a row of ``out``, which holds zeros."""
+def voxel_rows(
+    bands: Any, next_bands: Any, packed: Any, bounds: Any, side: float, n_points: int
+) -> Any:
+    """Return each transition's three grids as packed bits.
+
+    Parameters
+    ----------
+    bands, next_bands : ndarray of shape (n, reduced_dim)
+    packed : ndarray of shape (n_obstacles, 8)
+    bounds : ndarray of shape (2, 3)
+        Of the world, metres.
+    side : float
+        Of the grid, metres.
+    n_points : int
+        Points along a band whose cells are occupied.
+
+    Returns
+    -------
+    rows : ndarray of uint8 of shape (n, 3 * SIDE**3 / 8)
+    """
+    size = SIDE * SIDE * SIDE // 8
+    rows = np.zeros((bands.shape[0], 3 * size), np.uint8)
     cell, per_metre = side / SIDE, SIDE / side
     origin, centers = np.empty(3), np.empty((3, SIDE))
     columns, points = np.empty((SIDE, SIDE), np.uint32), np.empty((n_points, 3))
-    size = SIDE * SIDE * SIDE // 8
-    for index in range(rows.shape[0]):
-        row, following = rows[index], next_rows[index]
+    for index in range(bands.shape[0]):
+        band, following = bands[index], next_bands[index]
         for axis in range(3):
-            before, after = row[axis] + row[3 + axis], following[axis] + following[3 + axis]
+            before, after = band[axis] + band[3 + axis], following[axis] + following[3 + axis]
             origin[axis] = 0.25 * (before + after) - 0.5 * side
             for k in range(SIDE):
                 centers[axis, k] = origin[axis] + (k + 0.5) * cell
         fill_surroundings(centers, bounds, packed, columns)
-        write_columns(columns, out[index, :size])
-        resample_row(row, points)
-        add_points(points, origin, per_metre, out[index, size : 2 * size])
+        write_columns(columns, rows[index, :size])
+        resample_row(band, points)
+        add_points(points, origin, per_metre, rows[index, size : 2 * size])
         resample_row(following, points)
-        add_points(points, origin, per_metre, out[index, 2 * size :])
+        add_points(points, origin, per_metre, rows[index, 2 * size :])
+    return rows

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.rope.band.band import N_MATCHED, checked_bands
-from systems.rope.features.voxel_kernels import SIDE, fill_voxels
+from systems.rope.features.voxel_kernels import SIDE, voxel_rows
 from systems.rope.obstacles.shapes import Array
 from systems.rope.scene import Scene
 
@@ -39,9 +39,9 @@ def voxel_features(reduced: Array, next_reduced: Array, scene: Scene) -> NDArray
     """
     before = checked_bands(reduced, "reduced", scene)
     after = checked_bands(next_reduced, "next_reduced", scene, len(before))
-    rows = np.zeros((len(before), PACKED_BYTES), dtype=np.uint8)
-    side = scene.max_band_length
-    fill_voxels(before, after, scene.packed, scene.bounds, side, N_MATCHED, rows)
+    rows: NDArray[np.uint8] = voxel_rows(
+        before, after, scene.packed, scene.bounds, scene.max_band_length, N_MATCHED
+    )
     return rows
 
 

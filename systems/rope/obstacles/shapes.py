@@ -1,4 +1,8 @@
-"""Obstacles of a scene: boxes, cylinders and capsules, in metres in the world frame."""
+"""Obstacles of a scene: boxes, cylinders and capsules, in metres in the world frame.
+
+Users describe obstacles by objects. Compiled code reads them as the rows of one table, which
+:func:`pack_obstacles` writes and whose columns are named here.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +16,16 @@ from systems.validation import as_finite_array
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]
+Range = tuple[float, float]
 
 BOX, CYLINDER, CAPSULE = 0.0, 1.0, 2.0
+
+# Columns of a packed obstacle: its kind and its centre, or the start of a capsule's core segment.
+KIND, X, Y, Z = 0, 1, 2, 3
+HALF_X, HALF_Y, HALF_Z = 4, 5, 6  # of a box: half of the length of each side
+AXIS, HALF_LENGTH = 4, 5  # of a cylinder: the world axis that it runs along
+CORE_X, CORE_Y, CORE_Z = 4, 5, 6  # of a capsule: the vector from start to end
+RADIUS = 7  # of a cylinder or a capsule
 PACKED_WIDTH = 8
 
 
@@ -27,7 +39,7 @@ class Box:
     half_extents : array-like of shape (3,)
         Half of the length of each side.
     name : str
-        What messages and pictures call it.
+        Names the obstacle in messages, and decides its colour in pictures.
     """
 
     center: Point
@@ -99,8 +111,14 @@ class Capsule:
 Obstacle = Box | Cylinder | Capsule
 
 
+def box_from_ranges(x: Range, y: Range, z: Range, name: str) -> Box:
+    """Return the box that spans a range of coordinates, (low, high), along each axis."""
+    low, high = np.array([x, y, z]).T
+    return Box(tuple(0.5 * (low + high)), tuple(0.5 * (high - low)), name)
+
+
 def pack_obstacles(obstacles: Sequence[Obstacle]) -> Array:
-    """Write obstacles as the table that :mod:`systems.rope.obstacles.signed_distance` reads.
+    """Write obstacles as the rows of a table, for compiled code.
 
     Parameters
     ----------

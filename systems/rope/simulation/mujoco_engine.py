@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from systems.errors import SimulationDivergedError
-from systems.rope.obstacles.shapes import Array, Box, Cylinder, Obstacle
+from systems.rope.obstacles.mjcf import geom_xml, numbers_xml
+from systems.rope.obstacles.shapes import Array, Obstacle
 from systems.rope.scene import ROPE_RADIUS
 from systems.rope.simulation.state import RopeState
 
-# The rope moves quasi-statically: these make it follow its grippers and come to rest, without
-# jitter when it is taut and without lag when it is dragged over an edge.
+# These values make the rope move quasi-statically: it follows its grippers and comes to rest,
+# without jitter when it is taut and without lag when it is dragged over an edge. Units are SI.
 TIME_STEP = 0.005
 GRAVITY = 4.0
 NODE_MASS = 0.01
 FRICTION = 0.5
-VELOCITY_KEPT = 0.95  # of it, after every group of steps: slack swings down without overshoot
+# Share of the velocities that is kept after each group of steps, so that slack comes down without
+# swinging.
+VELOCITY_KEPT = 0.95
 CONTACT = 'solref="0.01 1" solimp="0.95 0.99 0.001"'
 STRETCH = 'solref="0.01 1" solimp="0.9 0.95 0.001"'
 
@@ -26,9 +28,9 @@ STRETCH = 'solref="0.01 1" solimp="0.9 0.95 0.001"'
 class MujocoRope:
     """A rope of ``n_nodes`` point masses, joined by capsules of ``spacing`` metres at rest.
 
-    Both end nodes are mocap bodies, so the grippers are where they are told to be, without any
-    constraint in between. A state that is loaded goes on bit by bit as the one that was saved,
-    in any instance.
+    Both end nodes are mocap bodies, whose positions are set, so the grippers are exactly where they
+    are told to be. A simulation that goes on from a loaded state is bit for bit the same as the one
+    that the state was saved from, in any instance.
 
     Parameters
     ----------
@@ -105,12 +107,12 @@ def _describe(obstacles: Sequence[Obstacle], rest: Array) -> str:
     edges = " ".join(f"{index} {index + 1}" for index in range(len(rest) - 1))
     bodies = [_body(name, place) for name, place in zip(names, rest, strict=True)]
     for end in (0, -1):
-        bodies[end] = f'<body name="{names[end]}" pos="{_text(rest[end])}" mocap="true"/>'
+        bodies[end] = f'<body name="{names[end]}" pos="{numbers_xml(rest[end])}" mocap="true"/>'
     return f"""
     <mujoco>
       <option timestep="{TIME_STEP}" gravity="0 0 {-GRAVITY}"><flag autoreset="disable"/></option>
       <default><geom contype="1" conaffinity="2" friction="{FRICTION}" {CONTACT}/></default>
-      <worldbody>{"".join(map(_geom, obstacles))}{"".join(bodies)}</worldbody>
+      <worldbody>{"".join(map(geom_xml, obstacles))}{"".join(bodies)}</worldbody>
       <deformable>
         <flex name="rope" dim="1" radius="{ROPE_RADIUS}" body="{" ".join(names)}" element="{edges}">
           <contact contype="2" conaffinity="0" selfcollide="none" condim="3"
@@ -124,20 +126,4 @@ def _describe(obstacles: Sequence[Obstacle], rest: Array) -> str:
 def _body(name: str, place: Array) -> str:
     joints = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
     inertia = f'<inertial pos="0 0 0" mass="{NODE_MASS}" diaginertia="1e-6 1e-6 1e-6"/>'
-    return f'<body name="{name}" pos="{_text(place)}">{inertia}{joints}</body>'
-
-
-def _geom(obstacle: Obstacle) -> str:
-    if isinstance(obstacle, Box):
-        size = _text(obstacle.half_extents)
-        return f'<geom type="box" pos="{_text(obstacle.center)}" size="{size}"/>'
-    if isinstance(obstacle, Cylinder):
-        half = obstacle.half_length * np.eye(3)[obstacle.axis]
-        ends = _text((*(obstacle.center - half), *(obstacle.center + half)))
-        return f'<geom type="cylinder" fromto="{ends}" size="{obstacle.radius}"/>'
-    ends = _text((*obstacle.start, *obstacle.end))
-    return f'<geom type="capsule" fromto="{ends}" size="{obstacle.radius}"/>'
-
-
-def _text(values: Any) -> str:
-    return " ".join(repr(float(value)) for value in values)
+    return f'<body name="{name}" pos="{numbers_xml(place)}">{inertia}{joints}</body>'

@@ -13,7 +13,7 @@ from systems.rope.obstacles.shapes import Array, Box, Cylinder, Obstacle
 from systems.rope.scene import ROPE_RADIUS
 from systems.rope.simulation.state import RopeState
 
-SCALE = 10.0  # engine lengths per metre: its contact margins are made for bodies of that size
+SCALE = 10.0  # engine lengths per metre, since its contact margins suit bodies of that size
 TIME_STEP = 0.01
 GRAVITY = 9.8  # engine lengths, hence 0.98 m/s²
 SOLVER_ITERATIONS = 20
@@ -21,8 +21,15 @@ LINK_MASS = 0.1
 LINEAR_DAMPING = 0.75
 ANGULAR_DAMPING = 0.9
 FRICTION = 1.0
-ROPE_GROUP, OBSTACLE_GROUP = 64, 2  # static bodies are in group 2, and never meet one another
+ROPE_GROUP, OBSTACLE_GROUP = 64, 2  # PyBullet puts static bodies into group 2
+
+# ``RopeState.simulation`` has a row for each node: its orientation, as a quaternion x, y, z, w; its
+# velocity, in engine lengths; and its angular velocity.
+ORIENTATION, VELOCITY, ANGULAR_VELOCITY = slice(0, 4), slice(4, 7), slice(7, 10)
 SIMULATION_WIDTH = 10
+
+UPRIGHT = [0.0, 0.0, 0.0, 1.0]
+ORIGIN = [0.0, 0.0, 0.0]
 
 
 class PybulletRope:
@@ -30,9 +37,9 @@ class PybulletRope:
 
     Neighbours are joined, and the grippers hold the centres of both end capsules, by
     point-to-point constraints, which give way when the rope is stretched. Every state is loaded
-    into a new simulator, so that the same states and moves always give the same result. Going on
-    from a saved state differs from never having stopped by less than a millimetre: the engine
-    does not show what it knows of its contacts.
+    into a new simulator, so that the same states and moves always give the same result. PyBullet
+    does not expose its contact cache, so an execution that goes on from a saved state differs from
+    one without the stop, by less than a millimetre.
 
     Parameters
     ----------
@@ -103,7 +110,8 @@ class PybulletRope:
             deterministicOverlappingPairs=1,
             physicsClientId=self._client,
         )
-        # Nobody looks, but without a simple shape to draw it meshes every body: four times slower.
+        # Nothing is drawn, but without a simple shape to draw PyBullet makes a mesh of every body,
+        # which is four times slower.
         self._drawn = bullet.createVisualShape(
             bullet.GEOM_BOX, halfExtents=[ROPE_RADIUS] * 3, physicsClientId=self._client
         )
@@ -152,7 +160,7 @@ class PybulletRope:
             shape,
             self._drawn,
             place,
-            row[:4],
+            row[ORIENTATION],
             useMaximalCoordinates=1,
             physicsClientId=client,
         )
@@ -165,7 +173,7 @@ class PybulletRope:
             physicsClientId=client,
         )
         bullet.setCollisionFilterGroupMask(link, -1, ROPE_GROUP, OBSTACLE_GROUP, client)
-        bullet.resetBaseVelocity(link, row[4:7], row[7:], client)
+        bullet.resetBaseVelocity(link, row[VELOCITY], row[ANGULAR_VELOCITY], client)
         return link
 
     def _add_grippers(self, grippers: Array) -> None:
@@ -198,10 +206,6 @@ class PybulletRope:
         )
 
 
-UPRIGHT = [0.0, 0.0, 0.0, 1.0]
-ORIGIN = [0.0, 0.0, 0.0]
-
-
 def _import_pybullet() -> ModuleType:
     try:
         import pybullet
@@ -226,7 +230,7 @@ def _at_rest(nodes: Array) -> Array:
     rows = np.zeros((len(nodes), SIMULATION_WIDTH))
     along = np.gradient(nodes, axis=0)
     lengths = np.linalg.norm(along, axis=1, keepdims=True)
-    rows[:, :4] = _turns_from_z(along / np.maximum(lengths, 1e-12))
+    rows[:, ORIENTATION] = _turns_from_z(along / np.maximum(lengths, 1e-12))
     return rows
 
 

@@ -1,75 +1,55 @@
-"""The true execution Γ of the rope: what its two physics engines have in common."""
+"""The true execution Γ of the rope: quasi-static, whatever the physics engine."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from enum import Enum
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from systems.errors import SimulationDivergedError
-from systems.rope.kernels import length_between
-from systems.rope.obstacles.shapes import Array, Obstacle
-from systems.rope.obstacles.signed_distance import signed_distance
+from systems.rope.obstacles.shapes import Array
+from systems.rope.rope_length import length_between
 from systems.rope.scene import GRIPPER_RADIUS, Scene
-from systems.rope.simulation.mujoco_engine import MujocoRope
-from systems.rope.simulation.pybullet_engine import PybulletRope
+from systems.rope.simulation.engines import ENGINES, RopeEngine
+from systems.rope.simulation.gripper_contact import (
+    gripper_clearance,
+    longest_displacement,
+    share_without_contact,
+)
 from systems.rope.simulation.state import RopeState
 from systems.rope.simulation.stop_reason import RopeStopReason
+from systems.rope.strides import LONGEST_STRIDE, RESTING_STEPS, STEPS_PER_STRIDE
 from systems.system import Rollout, StopReason
 from systems.validation import as_finite_array
 
-# The grippers move in strides that the rope can follow, and rest after every command. Near the
-# largest stretch the strides shorten, so that the execution ends on the boundary.
-LONGEST_STRIDE = 0.005
+# Near the largest allowed stretch the grippers' strides shorten, so that the execution ends close
+# to it. Metres.
 SHORTEST_STRIDE = 0.001
-STEPS_PER_STRIDE = 2
-RESTING_STEPS = 4
-SETTLING_STEPS = 800
+# So much shorter than the limit, in metres, the rope's length is an upper bound that needs no
+# measuring.
 LENGTH_MARGIN = 0.01
-CONTACT_SPACING = 0.001
-CONTACT_BISECTIONS = 20
+# Time steps until a rope that is laid somewhere has come to rest.
+SETTLING_STEPS = 800
+# A rope longer than the limit by this factor shows that the simulation has diverged.
 DIVERGED_LENGTH = 1.5
 
 
-class RopeEngine(Protocol):
-    """What Γ needs of a physics engine."""
-
-    def load(self, state: RopeState) -> None:
-        """Take over a state; one without ``simulation`` starts at rest."""
-
-    def save(self) -> RopeState:
-        """Return the present state."""
-
-    def move_grippers(self, grippers: Array) -> None:
-        """Put the grippers, of shape (2, 3), where they are to be."""
-
-    def step(self, n_steps: int) -> None:
-        """Advance by some time steps."""
-
-
-ENGINES: dict[str, Callable[[Sequence[Obstacle], int, float], RopeEngine]] = {
-    "mujoco": MujocoRope,
-    "pybullet": PybulletRope,
-}
-
-
 class RopeRollout:
-    """Γ: moves the grippers of a rope, quasi-statically, until something forbids it.
+    """Γ: moves the grippers of a rope, quasi-statically, until a constraint forbids it.
 
-    An execution ends on the boundary, never past it: before a gripper, a sphere of 23 mm, would
-    enter an obstacle, and before the rope would be longer than λ times its length at rest. The
-    same state and commands give the same result. The engine starts at the first execution and
-    does not pickle along.
+    An execution stops on the boundary of a constraint and never violates it: before a gripper, a
+    sphere with a radius of 23 mm, would enter an obstacle, and before the rope would be longer
+    than λ times its length at rest. The same state and commands give the same result. The physics
+    engine starts at the first execution, and is left out when a rollout is pickled.
 
     Parameters
     ----------
     scene : Scene
     engine : {"mujoco", "pybullet"}
-        With "mujoco", going on from a state that an execution returned gives bit by bit what
-        going on without a stop would have given; with "pybullet", within a millimetre.
+        With "mujoco", an execution that goes on from a returned state is bit for bit the same as
+        one without the stop; with "pybullet", to within a millimetre.
 
     References
     ----------
@@ -124,7 +104,8 @@ class RopeRollout:
         Returns
         -------
         rollout : Rollout
-            ``stop_reason`` is COMPLETED, GRIPPER_CONTACT or OVERSTRETCHED.
+            ``stop_reason`` is ``StopReason.COMPLETED`` or a
+            :class:`~systems.rope.simulation.stop_reason.RopeStopReason`.
 
         Raises
         ------
@@ -146,7 +127,7 @@ class RopeRollout:
         return Rollout(states, len(moves), StopReason.COMPLETED)
 
     def _carry_out(self, before: RopeState, move: Array) -> tuple[RopeState, Enum]:
-        share = self._share_without_contact(before.grippers, move)
+        share = share_without_contact(before.grippers, move, self.scene.packed)
         legal, arrived = self._move(before, share * move)
         if not arrived:
             return legal, RopeStopReason.OVERSTRETCHED
@@ -157,16 +138,17 @@ class RopeRollout:
         return rested, StopReason.COMPLETED if share == 1.0 else RopeStopReason.GRIPPER_CONTACT
 
     def _move(self, before: RopeState, move: Array) -> tuple[RopeState, bool]:
-        """Return the last known legal state, and whether the grippers arrived."""
+        """Return the last state that was measured and legal, and whether the grippers arrived."""
         engine, limit = self._engine(), self.scene.max_band_length
         legal, length = before, self._checked_length(before)
-        travelled, total = 0.0, _longest(move)
+        travelled, total = 0.0, longest_displacement(move)
         while travelled < total:
             stride = min(max((limit - length) / 4, SHORTEST_STRIDE), LONGEST_STRIDE)
             travelled = min(travelled + stride, total)
             engine.move_grippers(before.grippers + (travelled / total) * move)
             engine.step(STEPS_PER_STRIDE)
-            # The rope cannot have grown by more than its ends moved: measure it only near λ.
+            # The rope can't have grown by more than its ends moved, so it needs measuring only near
+            # the limit.
             length += 2 * stride
             if length > limit - LENGTH_MARGIN:
                 state = engine.save()
@@ -175,26 +157,6 @@ class RopeRollout:
                     return legal, False
                 legal = state
         return legal, True
-
-    def _share_without_contact(self, grippers: Array, move: Array) -> float:
-        """Return the largest share of a move that keeps both grippers out of the obstacles."""
-        longest = _longest(move)
-        if self._clearance(grippers) >= longest:
-            return 1.0
-        shares = np.linspace(0.0, 1.0, 1 + int(np.ceil(longest / CONTACT_SPACING)))
-        free = [self._clearance(grippers + share * move) >= 0.0 for share in shares]
-        if all(free):
-            return 1.0
-        first = free.index(False)
-        low, high = shares[max(first - 1, 0)], shares[first]
-        for _ in range(CONTACT_BISECTIONS):
-            middle = 0.5 * (low + high)
-            touches = self._clearance(grippers + middle * move) < 0.0
-            low, high = (low, middle) if touches else (middle, high)
-        return float(low)
-
-    def _clearance(self, grippers: Array) -> float:
-        return float(signed_distance(grippers, self.scene.packed).min()) - GRIPPER_RADIUS
 
     def _checked_length(self, state: RopeState) -> float:
         length = rope_length(state)
@@ -210,7 +172,7 @@ class RopeRollout:
         as_finite_array(state.nodes, "state.nodes", (self.scene.n_nodes, 3))
         if state.simulation is not None and not np.isfinite(state.simulation).all():
             raise ValueError("state.simulation must be finite, got NaN or infinity in it.")
-        if self._clearance(state.grippers) < 0.0:
+        if gripper_clearance(state.grippers, self.scene.packed) < 0.0:
             raise ValueError(
                 f"state must keep the grippers {GRIPPER_RADIUS} m away from the obstacles, got "
                 f"them at {state.grippers.tolist()}."
@@ -223,15 +185,12 @@ class RopeRollout:
 
     def _engine(self) -> RopeEngine:
         if "_started" not in vars(self):
-            spacing = self.scene.rope_length / (self.scene.n_nodes - 1)
-            self._started = ENGINES[self.engine](self.scene.obstacles, self.scene.n_nodes, spacing)
+            scene = self.scene
+            start_engine = ENGINES[self.engine]
+            self._started = start_engine(scene.obstacles, scene.n_nodes, scene.link_length)
         return self._started
 
 
 def rope_length(state: RopeState) -> float:
     """Return the length of a rope from gripper A along its nodes to gripper B, in metres."""
     return float(length_between(state.grippers, state.nodes))
-
-
-def _longest(move: Array) -> float:
-    return float(np.sqrt((move * move).sum(axis=1).max()))

@@ -14,12 +14,12 @@ class RopeState:
     Attributes
     ----------
     grippers : ndarray of shape (2, 3)
-        They hold the first and the last node.
+        Positions of grippers A and B, which hold the first and the last node.
     nodes : ndarray of shape (n_nodes, 3)
-        The rope's centre line.
+        The rope's centre line, from A to B.
     simulation : ndarray or None
-        What else the engine that wrote it needs to go on from here. None stands for a rope at
-        rest, which any engine can start from.
+        What else the engine needs to go on from here; only the engine that wrote it can read it.
+        None means that the rope is at rest, which any engine can start from.
     """
 
     grippers: Array

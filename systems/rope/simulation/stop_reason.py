@@ -1,4 +1,4 @@
-"""Why an execution of the rope can stop."""
+"""Why the execution of a rope may end early."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class RopeStopReason(Enum):
-    """Why an execution of the rope stopped early; each value is a sentence."""
+    """Why a rope's rollout ended before all commands were carried out."""
 
     GRIPPER_CONTACT = "A gripper would have touched an obstacle and stopped before it."
     OVERSTRETCHED = "The rope reached its largest allowed stretch and stopped there."

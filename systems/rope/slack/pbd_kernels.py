@@ -1,84 +1,127 @@
-"""Compiled dynamics of the PBD rope: links that fall, hang and slide while the ends are moved.
+"""Compiled position-based dynamics of PBD ropes: nodes that fall, hang and slide.
 
-Ropes that take the same steps are moved side by side, as lanes that come last in every array: each
-link waits for the one before it, and meanwhile a processor can work on those of other ropes.
+In each time step the nodes go on as they moved before, and fall; then links that are too long pull
+their two nodes together, a few times over from end to end; then nodes are pushed out of obstacles.
+
+Ropes that take the same number of steps are moved side by side, as *lanes*, which are the last
+axis of every array: each link has to wait for the one before it, and meanwhile the processor works
+on the other lanes.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from systems.compilation import compiled
-from systems.rope.kernels import length_between
 from systems.rope.obstacles.signed_distance_kernels import gradient, nearest_obstacle
+from systems.rope.rope_length import length_between
+from systems.rope.strides import LONGEST_STRIDE, RESTING_STEPS, STEPS_PER_STRIDE
 
-# Strides and steps are those of Γ. What gravity adds to a free node's displacement from step to
-# step, in metres, and the share of it that is kept, are MuJoCo's: 4 m/s² times 5 ms squared, and
-# 0.95 every other step.
-LONGEST_STRIDE = 0.005
-STEPS_PER_STRIDE = 2
-RESTING_STEPS = 4
+# What gravity adds to a free node's displacement in each time step, in metres, and the share of
+# the displacement that is kept, as in the MuJoCo simulation: 4 m/s² times (5 ms)², and 0.95 every
+# other step.
 FALL = 1e-4
 KEPT = 0.975
+# Times that all links are shortened, there and back, in each time step.
 SWEEPS = 2
-# Rows in a chunk: of a few, a processor waits; hundreds no longer fit into its cache.
+# Rows that are moved together: with a few the processor waits, hundreds do not fit into its cache.
 MOST_TOGETHER = 16
 
 
+class PbdModel(NamedTuple):
+    """What PBD ropes are made of, and the obstacles around them.
+
+    Attributes
+    ----------
+    n_nodes : int
+        Nodes of each rope, with both ends.
+    spacing : float
+        Length of a link at rest, metres.
+    kinds : ndarray of shape (n_ropes, 2)
+        Friction and radius, in metres, of each rope of a row.
+    packed : ndarray of shape (n_obstacles, 8)
+    """
+
+    n_nodes: int
+    spacing: float
+    kinds: Any
+    packed: Any
+
+
+class Lanes(NamedTuple):
+    """Ropes that are moved together; the last axis of each array has one entry per rope.
+
+    Attributes
+    ----------
+    nodes : ndarray of shape (n_nodes, 3, n_lanes)
+        Positions; the first and the last are held by the grippers.
+    moved : ndarray of shape (n_nodes, 3, n_lanes)
+        Displacements in the last time step.
+    before : ndarray of shape (n_nodes, 3, n_lanes)
+        Positions before the present time step.
+    clearance : ndarray of shape (n_nodes, n_lanes)
+        Lower bounds of the nodes' distances to the obstacles.
+    """
+
+    nodes: Any
+    moved: Any
+    before: Any
+    clearance: Any
+
+
 @compiled
-def read_rope(row: Any, q: Any, points: Any, moved: Any, lane: int) -> None:
-    """Read a PBD rope between grippers at ``q``: nodes, and their last displacements."""
-    last = points.shape[0] - 1
+def read_rope(rope: Any, grippers: Any, lanes: Lanes, lane: int) -> None:
+    """Read a PBD rope: its nodes between the grippers, then their last displacements."""
+    last = lanes.nodes.shape[0] - 1
     half = 3 * (last - 1)
     for k in range(3):
-        points[0, k, lane], points[last, k, lane] = q[k], q[3 + k]
+        lanes.nodes[0, k, lane], lanes.nodes[last, k, lane] = grippers[k], grippers[3 + k]
         for i in range(last - 1):
-            points[i + 1, k, lane] = row[3 * i + k]
-            moved[i + 1, k, lane] = row[half + 3 * i + k]
+            lanes.nodes[i + 1, k, lane] = rope[3 * i + k]
+            lanes.moved[i + 1, k, lane] = rope[half + 3 * i + k]
 
 
 @compiled
-def write_rope(points: Any, moved: Any, lane: int, row: Any) -> float:
+def write_rope(lanes: Lanes, lane: int, rope: Any) -> float:
     """Write what :func:`read_rope` reads; return how long the rope is."""
-    last = points.shape[0] - 1
+    last = lanes.nodes.shape[0] - 1
     half = 3 * (last - 1)
     for k in range(3):
         for i in range(last - 1):
-            row[3 * i + k] = points[i + 1, k, lane]
-            row[half + 3 * i + k] = moved[i + 1, k, lane]
-    return length_between(points[::last, :, lane], points[1:last, :, lane])
+            rope[3 * i + k] = lanes.nodes[i + 1, k, lane]
+            rope[half + 3 * i + k] = lanes.moved[i + 1, k, lane]
+    return length_between(lanes.nodes[::last, :, lane], lanes.nodes[1:last, :, lane])
 
 
 @compiled(error_model="numpy")
-def shorten_links(points: Any, i: int, spacing: float) -> None:
-    """Pull two neighbours of each rope together until their link is no longer than it should be."""
-    j, last = i + 1, points.shape[0] - 1
-    # Grippers do not give way.
+def shorten_links(nodes: Any, i: int, spacing: float) -> None:
+    """Pull nodes i and i + 1 of each rope together until their link is no longer than at rest."""
+    j, last = i + 1, nodes.shape[0] - 1
+    # The shares of the correction that either node takes: grippers do not give way.
     near = 0.0 if i == 0 else (1.0 if j == last else 0.5)
     far = 0.0 if j == last else (1.0 if i == 0 else 0.5)
-    for lane in range(points.shape[2]):
-        x = points[j, 0, lane] - points[i, 0, lane]
-        y = points[j, 1, lane] - points[i, 1, lane]
-        z = points[j, 2, lane] - points[i, 2, lane]
-        # Nodes at one place make this minus infinity, which numpy's way of dividing allows.
+    for lane in range(nodes.shape[2]):
+        x = nodes[j, 0, lane] - nodes[i, 0, lane]
+        y = nodes[j, 1, lane] - nodes[i, 1, lane]
+        z = nodes[j, 2, lane] - nodes[i, 2, lane]
+        # Nodes at one place make this minus infinity, which numpy's error model allows.
         excess = 1.0 - spacing / np.sqrt(x * x + y * y + z * z)
         excess = excess if excess > 0.0 else 0.0
-        points[i, 0, lane] += near * excess * x
-        points[i, 1, lane] += near * excess * y
-        points[i, 2, lane] += near * excess * z
-        points[j, 0, lane] -= far * excess * x
-        points[j, 1, lane] -= far * excess * y
-        points[j, 2, lane] -= far * excess * z
+        nodes[i, 0, lane] += near * excess * x
+        nodes[i, 1, lane] += near * excess * y
+        nodes[i, 2, lane] += near * excess * z
+        nodes[j, 0, lane] -= far * excess * x
+        nodes[j, 1, lane] -= far * excess * y
+        nodes[j, 2, lane] -= far * excess * z
 
 
 @compiled
-def push_out(
-    points: Any, i: int, lane: int, before: Any, friction: float, radius: float, packed: Any
-) -> float:
-    """Move a node out of the obstacles, and let it rub there; return how far from them it is."""
-    x, y, z = points[i, 0, lane], points[i, 1, lane], points[i, 2, lane]
+def push_out(lanes: Lanes, i: int, lane: int, friction: float, radius: float, packed: Any) -> float:
+    """Move a node out of the obstacles, with friction; return its distance to them."""
+    nodes, before = lanes.nodes, lanes.before
+    x, y, z = nodes[i, 0, lane], nodes[i, 1, lane], nodes[i, 2, lane]
     d, index = nearest_obstacle(x, y, z, packed)
     if d >= radius:
         return d
@@ -87,71 +130,78 @@ def push_out(
     x = x + depth * gx - before[i, 0, lane]
     y = y + depth * gy - before[i, 1, lane]
     z = z + depth * gz - before[i, 2, lane]
+    # The part of the displacement along the surface, of which friction takes some or all.
     away = x * gx + y * gy + z * gz
     u, v, w = x - away * gx, y - away * gy, z - away * gz
     slid = np.sqrt(u * u + v * v + w * w)
     held = 1.0 if slid <= friction * depth else friction * depth / slid
-    points[i, 0, lane] = before[i, 0, lane] + x - held * u
-    points[i, 1, lane] = before[i, 1, lane] + y - held * v
-    points[i, 2, lane] = before[i, 2, lane] + z - held * w
+    nodes[i, 0, lane] = before[i, 0, lane] + x - held * u
+    nodes[i, 1, lane] = before[i, 1, lane] + y - held * v
+    nodes[i, 2, lane] = before[i, 2, lane] + z - held * w
     return radius
 
 
 @compiled
-def step_ropes(
-    points: Any, moved: Any, before: Any, clear: Any, spacing: float, kinds: Any, packed: Any
-) -> None:
-    """Take one step; ``clear`` holds what each node surely is away from the obstacles."""
-    last, n_lanes = points.shape[0] - 1, points.shape[2]
-    for i in range(1, last):
+def fall(lanes: Lanes) -> None:
+    """Move free nodes on by their last displacements, and by gravity."""
+    nodes, moved, before = lanes.nodes, lanes.moved, lanes.before
+    for i in range(1, nodes.shape[0] - 1):
         for k in range(3):
-            fall = FALL if k == 2 else 0.0
-            for lane in range(n_lanes):
-                before[i, k, lane] = points[i, k, lane]
-                points[i, k, lane] = points[i, k, lane] + moved[i, k, lane] - fall
-    for _ in range(SWEEPS):
-        for i in range(last):
-            shorten_links(points, i, spacing)
-        for i in range(last - 1, -1, -1):
-            shorten_links(points, i, spacing)
-    for i in range(1, last):
-        for lane in range(n_lanes):
-            x = points[i, 0, lane] - before[i, 0, lane]
-            y = points[i, 1, lane] - before[i, 1, lane]
-            z = points[i, 2, lane] - before[i, 2, lane]
-            clear[i, lane] -= np.sqrt(x * x + y * y + z * z)
-        for lane in range(n_lanes):
-            friction, radius = kinds[lane % len(kinds)]
-            if clear[i, lane] < radius:
-                clear[i, lane] = push_out(points, i, lane, before, friction, radius, packed)
-        for k in range(3):
-            for lane in range(n_lanes):
-                moved[i, k, lane] = KEPT * (points[i, k, lane] - before[i, k, lane])
+            down = FALL if k == 2 else 0.0
+            for lane in range(nodes.shape[2]):
+                before[i, k, lane] = nodes[i, k, lane]
+                nodes[i, k, lane] = nodes[i, k, lane] + moved[i, k, lane] - down
 
 
 @compiled
-def move_together(
-    points: Any,
-    moved: Any,
-    commands: Any,
-    n_strides: int,
-    spacing: float,
-    kinds: Any,
-    packed: Any,
-) -> None:
-    """Carry out commands of the grippers, one for each lane, in strides, then rest."""
-    last, n_lanes = points.shape[0] - 1, points.shape[2]
-    before, clear = points.copy(), np.zeros((last + 1, n_lanes))
+def collide(lanes: Lanes, model: PbdModel) -> None:
+    """Push nodes out of the obstacles, and note how far each has moved in this time step."""
+    nodes, moved, before, clearance = lanes.nodes, lanes.moved, lanes.before, lanes.clearance
+    kinds, n_lanes = model.kinds, nodes.shape[2]
+    for i in range(1, nodes.shape[0] - 1):
+        # A distance changes by no more than the node moved, so it is rarely computed anew.
+        for lane in range(n_lanes):
+            x = nodes[i, 0, lane] - before[i, 0, lane]
+            y = nodes[i, 1, lane] - before[i, 1, lane]
+            z = nodes[i, 2, lane] - before[i, 2, lane]
+            clearance[i, lane] -= np.sqrt(x * x + y * y + z * z)
+        for lane in range(n_lanes):
+            friction, radius = kinds[lane % len(kinds)]
+            if clearance[i, lane] < radius:
+                clearance[i, lane] = push_out(lanes, i, lane, friction, radius, model.packed)
+        for k in range(3):
+            for lane in range(n_lanes):
+                moved[i, k, lane] = KEPT * (nodes[i, k, lane] - before[i, k, lane])
+
+
+@compiled
+def step_ropes(lanes: Lanes, model: PbdModel) -> None:
+    """Take one time step."""
+    nodes, n_links = lanes.nodes, lanes.nodes.shape[0] - 1
+    fall(lanes)
+    for _ in range(SWEEPS):
+        for i in range(n_links):
+            shorten_links(nodes, i, model.spacing)
+        for i in range(n_links - 1, -1, -1):
+            shorten_links(nodes, i, model.spacing)
+    collide(lanes, model)
+
+
+@compiled
+def carry_out(lanes: Lanes, commands: Any, n_strides: int, model: PbdModel) -> None:
+    """Carry out commands of the grippers, shape (6, n_lanes), in strides; then rest."""
+    nodes, before = lanes.nodes, lanes.before
+    last = nodes.shape[0] - 1
     for stride in range(n_strides):
         share = (stride + 1) / n_strides
         for k in range(3):
-            for lane in range(n_lanes):
-                points[0, k, lane] = before[0, k, lane] + share * commands[k, lane]
-                points[last, k, lane] = before[last, k, lane] + share * commands[3 + k, lane]
+            for lane in range(nodes.shape[2]):
+                nodes[0, k, lane] = before[0, k, lane] + share * commands[k, lane]
+                nodes[last, k, lane] = before[last, k, lane] + share * commands[3 + k, lane]
         for _ in range(STEPS_PER_STRIDE):
-            step_ropes(points, moved, before, clear, spacing, kinds, packed)
+            step_ropes(lanes, model)
     for _ in range(RESTING_STEPS):
-        step_ropes(points, moved, before, clear, spacing, kinds, packed)
+        step_ropes(lanes, model)
 
 
 @compiled
@@ -165,46 +215,70 @@ def strides_of(command: Any) -> int:
 
 
 @compiled
-def move_pbd_ropes(
-    rows: Any,
-    q: Any,
-    commands: Any,
-    valid: Any,
-    spacing: float,
-    longest: float,
-    kinds: Any,
-    packed: Any,
-    n: int,
-    out: Any,
-) -> None:
-    """Write where the PBD ropes of valid rows go; the others are copied.
+def start_lanes(ropes: Any, grippers: Any, together: Any, model: PbdModel) -> Lanes:
+    """Read the PBD ropes of some rows, one lane for each rope."""
+    n_kinds, width = len(model.kinds), 6 * (model.n_nodes - 2)
+    n_lanes = n_kinds * len(together)
+    nodes, moved = np.zeros((model.n_nodes, 3, n_lanes)), np.zeros((model.n_nodes, 3, n_lanes))
+    lanes = Lanes(nodes, moved, np.empty_like(nodes), np.zeros((model.n_nodes, n_lanes)))
+    for lane in range(n_lanes):
+        i, kind = together[lane // n_kinds], lane % n_kinds
+        read_rope(ropes[i, kind * width : (kind + 1) * width], grippers[i], lanes, lane)
+    lanes.before[:] = nodes
+    return lanes
 
-    Rows in which a rope becomes longer than ``longest`` are not valid. ``q`` holds the grippers'
-    positions before the commands, ``kinds`` the friction and the radius of each rope in a row;
-    ``n`` counts nodes with both ends.
+
+@compiled
+def propagate_pbd_ropes(
+    ropes: Any, grippers: Any, commands: Any, allowed: Any, model: PbdModel, max_length: float
+) -> tuple[Any, Any]:
+    """Let PBD ropes follow their grippers.
+
+    Parameters
+    ----------
+    ropes : ndarray of shape (n, pbd_dim)
+        See :mod:`systems.rope.slack.pbd_ropes`.
+    grippers : ndarray of shape (n, 6) or wider
+        Positions of gripper A and gripper B before the commands, metres, in the leading columns.
+    commands : ndarray of shape (n, 6)
+        Displacements of gripper A and gripper B, metres.
+    allowed : ndarray of bool of shape (n,)
+        Commands that are carried out.
+    model : PbdModel
+    max_length : float
+        Longest that a rope may become, metres.
+
+    Returns
+    -------
+    next_ropes : ndarray of shape (n, pbd_dim)
+    valid : ndarray of bool of shape (n,)
+        False, with the ropes left as they were, where the command is not allowed, or would make
+        one of the ropes longer than ``max_length``.
+
+    References
+    ----------
+    Mueller et al. 2007, "Position Based Dynamics".
     """
-    n_kinds, width = len(kinds), 6 * (n - 2)
-    n_strides = np.zeros(len(rows), np.int64)
-    for i in range(len(rows)):
-        out[i] = rows[i]
+    next_ropes, valid = ropes.copy(), allowed.copy()
+    n_kinds, width = len(model.kinds), 6 * (model.n_nodes - 2)
+    n_strides = np.zeros(len(ropes), np.int64)
+    for i in range(len(ropes)):
         if valid[i]:
             n_strides[i] = strides_of(commands[i])
-    for strides in range(1, n_strides.max() + 1 if len(rows) else 1):
+    for strides in range(1, n_strides.max() + 1 if len(ropes) else 1):
         alike = np.flatnonzero(n_strides == strides)
         for first in range(0, len(alike), MOST_TOGETHER):
             together = alike[first : first + MOST_TOGETHER]
-            n_lanes = n_kinds * len(together)
-            points, moved = np.zeros((n, 3, n_lanes)), np.zeros((n, 3, n_lanes))
-            moves = np.empty((6, n_lanes))
-            for lane in range(n_lanes):
+            lanes = start_lanes(ropes, grippers, together, model)
+            moves = np.empty((6, n_kinds * len(together)))
+            for lane in range(moves.shape[1]):
+                moves[:, lane] = commands[together[lane // n_kinds]]
+            carry_out(lanes, moves, strides, model)
+            for lane in range(moves.shape[1]):
                 i, kind = together[lane // n_kinds], lane % n_kinds
-                moves[:, lane] = commands[i]
-                read_rope(rows[i, kind * width : (kind + 1) * width], q[i], points, moved, lane)
-            move_together(points, moved, moves, strides, spacing, kinds, packed)
-            for lane in range(n_lanes):
-                i, kind = together[lane // n_kinds], lane % n_kinds
-                rope = out[i, kind * width : (kind + 1) * width]
-                valid[i] &= write_rope(points, moved, lane, rope) <= longest
+                rope = next_ropes[i, kind * width : (kind + 1) * width]
+                valid[i] &= write_rope(lanes, lane, rope) <= max_length
             for i in together:
                 if not valid[i]:
-                    out[i] = rows[i]
+                    next_ropes[i] = ropes[i]
+    return next_ropes, valid

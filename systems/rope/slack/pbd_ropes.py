@@ -1,28 +1,29 @@
-"""PBD ropes: cheap guesses at how the rope itself hangs, carried beside the band.
+"""PBD ropes: cheap estimates of where the rope itself hangs, kept beside the band.
 
-The band forgets where the slack is; a PBD rope remembers. Its nodes fall, its links go slack
-but do not stretch, and where it rests it rubs: position-based dynamics. Two, one of which rubs
-more while the other is thicker, take a tenth to a seventh of what MuJoCo takes
-(``benchmarks.speed.rope_engines``). They err by a centimetre or two, and now and then about what
-the rope gets caught on, though rarely both at once. A plan may overstretch neither, as it may not
-overstretch the band; all else that they say is a feature to learn from.
+The band forgets where the slack of the rope is; a PBD rope, moved by position-based dynamics,
+remembers: its nodes fall, its links go slack but do not stretch, and obstacles that it lies on
+hold it back by friction. There are two, one with more friction, the other thicker; together they
+take a tenth to a seventh of the time that MuJoCo takes (``benchmarks.speed.rope_engines``). Their
+nodes are a centimetre or two from the rope's. Sometimes they are wrong about what the rope gets
+caught on, but rarely both at once. A plan may overstretch neither of them, just as it may not
+overstretch the band. All else that they tell is left to the classifier, as features.
 
-They are a row of ``pbd_dim(scene)`` numbers. For each rope these are the nodes between the
-grippers from A to B, metres in the world frame, and then how far each of them moved in the last
-of the steps that every command is carried out in.
+A row holds them as ``pbd_dim(scene)`` numbers: for each rope the positions of the nodes between
+the grippers, from A to B, in metres in the world frame; and then the displacement of each of these
+nodes in the last time step.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from systems.rope.obstacles.shapes import Array
 from systems.rope.scene import ROPE_RADIUS, Scene
-from systems.rope.slack.pbd_kernels import move_pbd_ropes
+from systems.rope.slack.pbd_kernels import PbdModel
 
-# Friction and radius of each. Only nodes are kept out of obstacles, and the links between them cut
-# edges: so they are thicker than the rope. What depends on which of the two it is, is in doubt.
+# Friction and radius, in metres, of each PBD rope. Only nodes are kept out of obstacles, while the
+# links between them cut edges, so the radii are larger than the rope's. Where the two ropes
+# disagree, the outcome is uncertain.
 KINDS = np.array([[0.35, ROPE_RADIUS + 0.002], [0.25, ROPE_RADIUS + 0.004]])
 
 
@@ -31,55 +32,22 @@ def pbd_dim(scene: Scene) -> int:
     return len(KINDS) * 6 * (scene.n_nodes - 2)
 
 
+def pbd_model(scene: Scene) -> PbdModel:
+    """Return what the PBD ropes in this scene are made of, for compiled code."""
+    return PbdModel(scene.n_nodes, scene.link_length, KINDS, scene.packed)
+
+
 def pbd_ropes_at_rest(nodes: Array) -> Array:
-    """Describe ropes that rest with their nodes, shape (n_nodes, 3), where they are."""
-    inner = nodes[1:-1].ravel()
-    return np.tile(np.concatenate([inner, np.zeros_like(inner)]), len(KINDS))
-
-
-def pbd_nodes(loose: Array, grippers: Array) -> Array:
-    """Return the nodes of a row's ropes and its grippers, shape (n_ropes, n_nodes, 3)."""
-    inner = loose.reshape(len(KINDS), 2, -1, 3)[:, 0]
-    ends = np.broadcast_to(grippers.reshape(2, 1, 1, 3), (2, len(KINDS), 1, 3))
-    return np.concatenate([ends[0], inner, ends[1]], axis=1)
-
-
-def propagate_pbd_ropes(
-    loose: Array,
-    grippers: Array,
-    command: Array,
-    moves: NDArray[np.bool_],
-    scene: Scene,
-    longest: float,
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Let PBD ropes follow their grippers.
+    """Return PBD ropes that are where a rope is, and at rest.
 
     Parameters
     ----------
-    loose : ndarray of shape (n, pbd_dim)
-    grippers : ndarray of shape (n, 6)
-        Where they are before the command.
-    command : ndarray of shape (n, 6)
-        Displacements of gripper A and gripper B, metres.
-    moves : ndarray of bool of shape (n,)
-        Which of them are carried out; the other ropes stay as they are.
-    scene : Scene
-    longest : float
-        Longest that a rope may become, metres.
+    nodes : ndarray of shape (n_nodes, 3)
+        The rope's, from gripper to gripper.
 
     Returns
     -------
-    next_pbd : ndarray of shape (n, pbd_dim)
-    valid : ndarray of bool of shape (n,)
-        Those of ``moves`` after which no rope is longer; ropes that would be stay as they are.
-
-    References
-    ----------
-    Mueller et al. 2007, "Position Based Dynamics".
+    ropes : ndarray of shape (pbd_dim,)
     """
-    next_pbd, valid = np.empty_like(loose), moves.copy()
-    spacing, n_nodes = scene.rope_length / (scene.n_nodes - 1), scene.n_nodes
-    move_pbd_ropes(
-        loose, grippers, command, valid, spacing, longest, KINDS, scene.packed, n_nodes, next_pbd
-    )
-    return next_pbd, valid
+    inner = nodes[1:-1].ravel()
+    return np.tile(np.concatenate([inner, np.zeros_like(inner)]), len(KINDS))
