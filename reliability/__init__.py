@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from reliability.boosting import FastHistGradientBoostingClassifier
     from reliability.classifier import TransitionReliabilityClassifier
     from reliability.collect import collect_transitions
+    from reliability.fast_inference.compiling import compile_inference
     from reliability.persistence import ModelFileError, load_estimator
     from reliability.summary import Summary
 
@@ -26,6 +27,7 @@ __all__ = [
     "TransitionReliabilityClassifier",
     "Transitions",
     "collect_transitions",
+    "compile_inference",
     "label_transitions",
     "load_estimator",
 ]
@@ -34,6 +36,7 @@ _HOMES = {
     "FastHistGradientBoostingClassifier": "reliability.boosting",
     "TransitionReliabilityClassifier": "reliability.classifier",
     "collect_transitions": "reliability.collect",
+    "compile_inference": "reliability.fast_inference.compiling",
     "ModelFileError": "reliability.persistence",
     "load_estimator": "reliability.persistence",
     "Summary": "reliability.summary",
