@@ -66,7 +66,7 @@ class CheckTransition:
 
     @property
     def answers_fast(self) -> bool:
-        """Whether single transitions cost about as little as those of a large batch."""
+        """Whether a search may ask about single transitions, rather than about many at a time."""
         return self._adapter.answers_fast
 
     def __call__(self, reduced: Array, next_reduced: Array) -> NDArray[np.bool_]:

@@ -30,7 +30,7 @@ class EstimatorAdapter(Protocol):
     Attributes
     ----------
     answers_fast : bool
-        Whether a transition alone costs about as little as in a large batch.
+        Whether a search may ask about single transitions, rather than about many at a time.
     """
 
     answers_fast: bool
@@ -79,7 +79,18 @@ def adapt_estimator(system: System, estimator: Any) -> EstimatorAdapter:
     inference = compile_inference(estimator)
     if inference is None:
         return _Public(system, estimator, classes, meanings.index(True))
-    return _Compiled(system, type(estimator).__name__, inference, meanings.index(True))
+    return _Compiled(system, estimator, inference, meanings.index(True))
+
+
+def _answers_fast(estimator: Any) -> bool:
+    """Whether an estimator was made to answer for single transitions.
+
+    Compiled trees answer quickly as well. Yet over 30 problems of the arm they planned no faster
+    with OMPL's RRT-Connect, which asks about single transitions, than with the one that asks
+    about many at a time: that one asks about 15 to 30 % fewer.
+    """
+    offers = hasattr(estimator, "fast_decision_function")
+    return offers and not getattr(estimator, "prefers_batches", False)
 
 
 class _Constant:
@@ -104,13 +115,13 @@ class _Compiled:
     """An estimator that is asked through :func:`reliability.compile_inference`."""
 
     def __init__(
-        self, system: System, name: str, inference: CompiledInference, reliable: int
+        self, system: System, estimator: Any, inference: CompiledInference, reliable: int
     ) -> None:
         self._system = system
-        self._source = f"{name}, compiled,"
+        self._source = f"{type(estimator).__name__}, compiled,"
         self._inference = inference
         self._reliable = reliable
-        self.answers_fast = not inference.prefers_batches
+        self.answers_fast = _answers_fast(estimator)
 
     def classify(self, reduced: Array, next_reduced: Array) -> NDArray[np.bool_]:
         return self._is_reliable(self._scores(reduced, next_reduced))

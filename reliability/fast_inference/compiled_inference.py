@@ -31,8 +31,6 @@ class CompiledInference:
         Maps scores and a class, 0 or 1, to that column of ``predict_proba``.
     decision : callable or None
         Maps scores to ``decision_function``; None if the classifier has no such method.
-    prefers_batches : bool
-        Whether a row costs much less among many than alone.
     scores_are_public : bool
         Whether ``probability`` and ``decision`` are known to be those of the public methods, so
         that a wrapper's threshold or calibration can be applied to them.
@@ -42,12 +40,11 @@ class CompiledInference:
     is_second: Callable[[Scores], NDArray[np.bool_]]
     probability: Callable[[Scores, int], NDArray[np.float64]]
     decision: Callable[[Scores], Scores] | None
-    prefers_batches: bool = False
     scores_are_public: bool = True
 
 
 def from_decisions(
-    score: Callable[[NDArray[Any]], Scores], **attributes: bool
+    score: Callable[[NDArray[Any]], Scores], scores_are_public: bool = True
 ) -> CompiledInference:
     """Return the inference of a classifier whose decision function is a log-odds.
 
@@ -57,25 +54,20 @@ def from_decisions(
     ----------
     score : callable
         Maps feature rows to ``decision_function``, shape (n,).
-    **attributes
-        ``prefers_batches`` and ``scores_are_public``.
+    scores_are_public : bool, default=True
     """
-    return CompiledInference(score, _is_positive, _logistic, _unchanged, **attributes)
+    return CompiledInference(score, _is_positive, _logistic, _unchanged, scores_are_public)
 
 
-def from_probabilities(
-    score: Callable[[NDArray[Any]], Scores], **attributes: bool
-) -> CompiledInference:
+def from_probabilities(score: Callable[[NDArray[Any]], Scores]) -> CompiledInference:
     """Return the inference of a classifier that predicts the class of the largest probability.
 
     Parameters
     ----------
     score : callable
         Maps feature rows to ``predict_proba``, shape (n, 2).
-    **attributes
-        ``prefers_batches`` and ``scores_are_public``.
     """
-    return CompiledInference(score, _second_is_larger, _column, None, **attributes)
+    return CompiledInference(score, _second_is_larger, _column, None)
 
 
 def _is_positive(decisions: Scores) -> NDArray[np.bool_]:

@@ -115,11 +115,7 @@ def _compile_fast(estimator: Any) -> CompiledInference:
     def score(rows: NDArray[Any]) -> Scores:
         return one_per_row(ask(rows), len(rows), source) if len(rows) else np.zeros(0)
 
-    return from_decisions(
-        score,
-        prefers_batches=bool(getattr(estimator, "prefers_batches", False)),
-        scores_are_public=type(estimator) is TransitionReliabilityClassifier,
-    )
+    return from_decisions(score, type(estimator) is TransitionReliabilityClassifier)
 
 
 def _compile_search(search: Any) -> CompiledInference | None:

@@ -86,8 +86,7 @@ def calibrated(
         total /= len(members)
         return total
 
-    batches = any(inner.prefers_batches for inner, _ in members)
-    return from_probabilities(score, prefers_batches=batches)
+    return from_probabilities(score)
 
 
 def compile_calibrator(calibrator: Any, method: str) -> Reading | None:
