@@ -2,6 +2,7 @@
 
 import warnings
 
+import joblib
 import numpy as np
 import pandas as pd
 import pytest
@@ -15,6 +16,7 @@ from sklearn.linear_model import LogisticRegression, SGDClassifier
 from sklearn.model_selection import FixedThresholdClassifier
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
+from test_planners import assert_same_plan
 from threadpoolctl import threadpool_limits
 from toy_systems import Disc
 
@@ -368,3 +370,13 @@ def test_planning_asks_trees_through_compiled_code(estimator, monkeypatch):
     plan = BiasedRRT(Disc(), estimator, accuracy=0.9, random_state=0).plan([-0.9, 0.1], [-0.5, 0.8])
     assert plan.success
     assert plan.n_checked > 0
+
+
+def test_other_processes_make_the_same_plans():
+    pipeline = make_pipeline(StandardScaler(), BOOSTING).fit(*data())
+    planners = [BiasedRRT(Disc(), pipeline, accuracy=0.9, random_state=seed) for seed in range(4)]
+    problem = [-0.9, 0.1], [-0.5, 0.8]
+    here = [planner.plan(*problem) for planner in planners]
+    elsewhere = joblib.Parallel(n_jobs=2)(joblib.delayed(each.plan)(*problem) for each in planners)
+    for one, other in zip(here, elsewhere, strict=True):
+        assert_same_plan(one, other)

@@ -1,5 +1,6 @@
 """Compiled classifiers answer as their public methods do, through whatever is around them."""
 
+import doctest
 import pickle
 
 import numpy as np
@@ -34,6 +35,7 @@ from reliability import (
     TransitionReliabilityClassifier,
     compile_inference,
 )
+from reliability.fast_inference import compiling
 from reliability.fast_inference.scaling_kernel import scaled_rows
 from reliability.fast_inference.tree_kernels import LEAF, NODE, leaf_sums
 
@@ -321,6 +323,7 @@ def test_what_is_not_known_is_left_to_the_public_methods():
         clone(FOREST),
         clone(OURS),
         make_pipeline(StandardScaler(), clone(FOREST)),
+        make_pipeline(StandardScaler(), clone(FOREST).fit(X, y)),
         LogisticRegression().fit(X, y),
         make_pipeline(PCA(2), clone(FOREST)).fit(X, y),
         make_pipeline(StandardScaler(), LogisticRegression()).fit(X, y),
@@ -401,6 +404,12 @@ def test_damaged_trees_are_refused(field, value):
     model._predictors[2][0].nodes[field][0] = value
     with pytest.raises(ValueError, match="HistGradientBoostingClassifier is damaged"):
         compile_inference(model)
+
+
+def test_the_example_of_the_docstring_runs():
+    results = doctest.testmod(compiling)
+    assert results.attempted > 0
+    assert results.failed == 0
 
 
 def test_the_kernel_walks_as_plain_python_does(rng):

@@ -128,7 +128,8 @@ def _compile_frozen(frozen: Any) -> CompiledInference | None:
 
 def _compile_pipeline(pipeline: Any) -> CompiledInference | None:
     steps = [step for _, step in pipeline.steps[:-1] if step is not None and step != "passthrough"]
-    if not all(type(step) in SCALERS for step in steps):
+    # scikit-learn calls a pipeline fitted if its last step is.
+    if not all(type(step) in SCALERS and hasattr(step, "n_features_in_") for step in steps):
         return None
     transforms = [compile_scaler(step) for step in steps]
     final = compile_inference(pipeline.steps[-1][1])
@@ -176,8 +177,6 @@ def _compile_threshold(
 def _compile_calibration(wrapper: Any) -> CompiledInference | None:
     members = []
     for part in wrapper.calibrated_classifiers_:
-        if not np.array_equal(part.estimator.classes_, wrapper.classes_):
-            return None
         inner = compile_inference(part.estimator)
         calibrator = compile_calibrator(part.calibrators[0], part.method)
         if inner is None or not inner.scores_are_public or calibrator is None:

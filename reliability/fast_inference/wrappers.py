@@ -40,13 +40,11 @@ def with_threshold(
     inference : CompiledInference or None
         None if ``inner`` has no such response.
     """
-    if response_method == "decision_function" and inner.decision is None:
+    response = _response_to_threshold(inner, response_method, positive)
+    if response is None:
         return None
-    takes_decisions = response_method == "decision_function"
-    read = _decision_of(inner, positive) if takes_decisions else _probability_of(inner, positive)
-    least = threshold
-    if isinstance(threshold, str):
-        least = 0.0 if takes_decisions else 0.5
+    read, usual = response
+    least = usual if isinstance(threshold, str) else threshold
 
     def is_second(scores: Scores) -> NDArray[np.bool_]:
         reaches: NDArray[np.bool_] = read(scores) >= least
@@ -55,14 +53,16 @@ def with_threshold(
     return replace(inner, is_second=is_second)
 
 
-def _decision_of(inner: CompiledInference, positive: int) -> Reading:
+def _response_to_threshold(
+    inner: CompiledInference, response_method: str, positive: int
+) -> tuple[Reading, float] | None:
+    """Return what is compared with a threshold, and the threshold that "auto" stands for."""
+    if response_method != "decision_function":
+        return (lambda scores: inner.probability(scores, positive)), 0.5
     decision, sign = inner.decision, 1 if positive == 1 else -1
-    assert decision is not None
-    return lambda scores: sign * decision(scores)
-
-
-def _probability_of(inner: CompiledInference, positive: int) -> Reading:
-    return lambda scores: inner.probability(scores, positive)
+    if decision is None:
+        return None
+    return (lambda scores: sign * decision(scores)), 0.0
 
 
 def calibrated(
@@ -79,7 +79,7 @@ def calibrated(
     def score(rows: NDArray[Any]) -> NDArray[np.float64]:
         total = np.zeros((len(rows), 2))
         for inner, calibrate in members:
-            response = _response(inner, inner.score(rows))
+            response = _response_to_calibrate(inner, inner.score(rows))
             second = np.asarray(calibrate(response), dtype=np.float64)
             total[:, 0] += 1.0 - second
             total[:, 1] += second
@@ -119,6 +119,6 @@ def compile_calibrator(calibrator: Any, method: str) -> Reading | None:
     return calibrate
 
 
-def _response(inner: CompiledInference, scores: Scores) -> Scores:
+def _response_to_calibrate(inner: CompiledInference, scores: Scores) -> Scores:
     """Return what calibration takes: decisions where there are any, else probabilities."""
     return inner.decision(scores) if inner.decision else inner.probability(scores, 1)
