@@ -1,6 +1,7 @@
 from .boosting import FastHistGradientBoostingClassifier as FastHistGradientBoostingClassifier
 from .classifier import TransitionReliabilityClassifier as TransitionReliabilityClassifier
 from .collect import collect_transitions as collect_transitions
+from .fast_inference.compiling import compile_inference as compile_inference
 from .labels import RELIABLE as RELIABLE
 from .labels import UNRELIABLE as UNRELIABLE
 from .labels import label_transitions as label_transitions

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from sklearn.calibration import CalibratedClassifierCV
 from sklearn.dummy import DummyClassifier
-from sklearn.ensemble import RandomForestClassifier
+from sklearn.ensemble import HistGradientBoostingClassifier, RandomForestClassifier
 from sklearn.linear_model import LogisticRegression, SGDClassifier
+from sklearn.model_selection import FixedThresholdClassifier
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.tree import DecisionTreeClassifier
@@ -25,6 +26,9 @@ ESTIMATORS = {
     "pipeline": make_pipeline(StandardScaler(), LogisticRegression()),
     "ours in a pipeline": make_pipeline(StandardScaler(), OURS),
     "calibrated": CalibratedClassifierCV(DecisionTreeClassifier(max_depth=5), cv=3),
+    "threshold": FixedThresholdClassifier(
+        CalibratedClassifierCV(HistGradientBoostingClassifier(max_iter=20), cv=2), threshold=0.6
+    ),
     "without probabilities": SGDClassifier(random_state=0),
 }
 
