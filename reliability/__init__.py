@@ -9,6 +9,7 @@ from reliability.labels import RELIABLE, UNRELIABLE, label_transitions
 from reliability.transitions import Transitions
 
 if TYPE_CHECKING:
+    from reliability.backends import MLP, VoxNet
     from reliability.boosting import FastHistGradientBoostingClassifier
     from reliability.classifier import TransitionReliabilityClassifier
     from reliability.collect import collect_transitions
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "MLP",
     "RELIABLE",
     "UNRELIABLE",
     "FastHistGradientBoostingClassifier",
@@ -25,12 +27,15 @@ __all__ = [
     "Summary",
     "TransitionReliabilityClassifier",
     "Transitions",
+    "VoxNet",
     "collect_transitions",
     "label_transitions",
     "load_estimator",
 ]
 
 _HOMES = {
+    "MLP": "reliability.backends",
+    "VoxNet": "reliability.backends",
     "FastHistGradientBoostingClassifier": "reliability.boosting",
     "TransitionReliabilityClassifier": "reliability.classifier",
     "collect_transitions": "reliability.collect",

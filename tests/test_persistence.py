@@ -61,7 +61,7 @@ def test_truncated_files_are_refused(saved, share):
 
 def test_files_of_another_format_are_refused(saved, arm_classifier, tmp_path):
     state = arm_classifier.__getstate__() | {"_format_version": 99}
-    with pytest.raises(ModelFileError, match=r"saved in format 99 with .* reads format 1. Load it"):
+    with pytest.raises(ModelFileError, match=r"saved in format 99 with .* reads format 2. Load it"):
         TransitionReliabilityClassifier().__setstate__(state)
 
 
