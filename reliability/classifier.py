@@ -317,7 +317,11 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         super().__setstate__(state)
 
     def _check_checkpoint(self) -> None:
-        if self.checkpoint is not None and self.random_state is None:
+        if self.checkpoint is None:
+            return
+        if not isinstance(self.checkpoint, str | os.PathLike):
+            raise ValueError(f"checkpoint must be the path of a file, got {self.checkpoint!r}.")
+        if self.random_state is None:
             raise ValueError(
                 "checkpoint needs a random_state, as without one a training can't be repeated. "
                 "Pass an integer."

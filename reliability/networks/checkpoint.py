@@ -68,6 +68,8 @@ class Checkpoint(Callback):
 
     def _check_writable(self) -> None:
         try:
+            if self.path.is_dir():
+                raise IsADirectoryError("it is a folder")
             self._partial.write_bytes(b"")
             self._partial.unlink()
         except OSError as error:

@@ -65,7 +65,9 @@ def _check(given: dict[str, Any]) -> None:
         if name in given:
             check_count(given[name], name)
     if "learning_rate" in given:
-        check_number(given["learning_rate"], "learning_rate", 0, np.finfo(np.float64).max)
+        check_number(given["learning_rate"], "learning_rate", 0, np.inf)
+        if given["learning_rate"] == np.inf:
+            raise ValueError("learning_rate must be finite, got inf.")
     for name in ("learning_rate_decay", "validation_fraction"):
         if name in given:
             check_number(given[name], name, 0, 1)

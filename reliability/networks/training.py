@@ -15,13 +15,13 @@ from skorch.helper import predefined_split
 
 from reliability.networks.batches import Batches, LabelledRows, digest
 from reliability.networks.checkpoint import Checkpoint
-from reliability.networks.devices import one_thread
+from reliability.networks.devices import check_device, one_thread
 from reliability.networks.hyperparameters import Hyperparameters, as_plain
 from reliability.networks.metrics import EpochMetrics, WeightedLoss
 from reliability.networks.progress import ProgressBar
 
-# A training and its continuation may differ in these.
-_FREE = {"max_epochs", "validation_fraction"}
+# A training and its continuation may differ in this.
+_FREE = {"max_epochs"}
 _RECORDED = ("epoch", "train_loss", "valid_loss", "valid_accuracy")
 
 
@@ -52,6 +52,8 @@ def train(task: TrainingTask) -> tuple[dict[str, NDArray[Any]], list[dict[str, f
 
     Raises
     ------
+    ValueError
+        If there is no such device, or the checkpoint can't be written.
     FloatingPointError
         If the loss stops being finite.
     ModelFileError
@@ -59,6 +61,7 @@ def train(task: TrainingTask) -> tuple[dict[str, NDArray[Any]], list[dict[str, f
     KeyboardInterrupt
         If the user interrupts.
     """
+    check_device(task.device)
     cuda_devices = [task.device] if task.device.startswith("cuda") else []
     stop = _early_stopping(task)
     with one_thread(), torch.random.fork_rng(cuda_devices):
