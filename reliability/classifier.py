@@ -174,6 +174,10 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         tags.classifier_tags.multi_class = False
         return tags
 
+    def __sklearn_is_fitted__(self) -> bool:
+        """Tell scikit-learn whether a training has come to its end."""
+        return hasattr(self, "_inference")
+
     def fit(
         self,
         X: ArrayLike,
@@ -232,7 +236,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         return self
 
     def decision_function(self, X: ArrayLike) -> NDArray[np.float32]:
-        """Return the logit of the second class for each row of X.
+        """Return the logit of the second class, its log-odds, for each row of X.
 
         Parameters
         ----------

@@ -140,6 +140,43 @@ def test_clones_are_unfitted_copies():
         again.predict([[0.0]])
 
 
+def test_one_class_among_the_training_rows_is_predicted_for_every_row():
+    X = np.zeros((40, 2))
+    y = np.where(np.arange(40) < 4, "bad", "good")
+    for wanted, other in (("good", "bad"), ("bad", "good")):
+        with pytest.warns(UserWarning, match="all of one class, which will be predicted"):
+            classifier = small().fit(X, y, sample_weight=(y == wanted).astype(float))
+        assert classifier.classes_.tolist() == ["bad", "good"]
+        assert set(classifier.predict(X)) == {wanted}
+        probability = dict(zip(classifier.classes_, classifier.predict_proba(X)[0], strict=True))
+        assert probability[wanted] == pytest.approx(1, abs=1e-9)
+        assert probability[other] == pytest.approx(0, abs=1e-9)
+        assert (classifier.fast_decision_function(X) > 0).all() == (wanted == "good")
+        assert classifier.history_ == []
+        assert not classifier.prefers_batches
+
+
+def test_a_failed_fit_is_no_fit(rng):
+    X = rng.normal(size=(60, 2)) * 1e30
+    classifier = small(learning_rate=1e30)
+    with pytest.raises(FloatingPointError):
+        classifier.fit(X, X[:, 0] > 0)
+    with pytest.raises(NotFittedError):
+        classifier.predict(X)
+
+
+def test_answers_follow_the_order_of_the_classes(rng):
+    X = rng.normal(size=(300, 2))
+    reliable = X[:, 0] > 0
+    ours = small().fit(X, reliable.astype(int))
+    swapped = small().fit(X, np.where(reliable, -7, 5))
+    assert swapped.classes_.tolist() == [-7, 5]
+    assert np.mean(swapped.predict(X) == np.where(reliable, -7, 5)) > 0.9
+    assert np.mean((swapped.decision_function(X) < 0) == reliable) > 0.9
+    assert np.mean((ours.predict_proba(X)[:, 1] > 0.5) == reliable) > 0.9
+    assert np.mean((swapped.predict_proba(X)[:, 0] > 0.5) == reliable) > 0.9
+
+
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [

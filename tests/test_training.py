@@ -167,6 +167,7 @@ def test_class_weights_count_in_the_loss_and_not_in_the_accuracy(rng):
     assert classifier.history_[0]["train_loss"] == pytest.approx(expected, rel=1e-5)
     right = (X[held_out, 0] > 0) == LABELS[held_out]
     assert classifier.validation_accuracy_ == pytest.approx(right.mean())
+    assert classifier.history_[0]["valid_accuracy"] == pytest.approx(right.mean())
 
 
 def test_random_labels_of_weight_zero_do_not_lower_the_accuracy(rng):

@@ -11,7 +11,9 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from planners.check_transition import CheckTransition
 from reliability import TransitionReliabilityClassifier, VoxNet
+from reliability.networks.voxel_format import grid_shape
 from reliability.networks.voxel_grids import transformed, unpacked, unpacked_on_device
+from reliability.networks.voxnet_module import Dropout
 from systems import Rope
 
 QUICK = {"max_epochs": 6, "batch_size": 16, "learning_rate": 3e-3, "random_state": 0}
@@ -201,3 +203,63 @@ def test_diverging_training_stops_and_says_so(data):
     X, y = data
     with pytest.raises(FloatingPointError, match="Training diverged in epoch 1"):
         voxnet(learning_rate=1e38, mixed_precision=False).fit(X, y)
+
+
+@pytest.mark.parametrize("side", [16, 32, 64])
+def test_the_number_of_bytes_tells_channels_and_side(side):
+    for channels in range(1, 8):
+        assert grid_shape(channels * side**3 // 8) == (channels, side)
+    for n_bytes in (0, side**3 // 8 - 1, 11 * side**3 // 8):
+        with pytest.raises(ValueError, match=f"bit-packed grids, .* got {n_bytes} bytes a row"):
+            grid_shape(n_bytes)
+
+
+def test_floats_are_repeated_until_they_fill_a_grid(rng):
+    X = rng.normal(size=(40, 6)).astype(np.float32)
+    y = X[:, 0] > 0
+    short = voxnet(max_epochs=1).fit(X, y)
+    full = voxnet(max_epochs=1).fit(np.tile(X, (1, 12**3 // 6)), y)
+    expected = full.decision_function(np.tile(X, (1, 12**3 // 6)))
+    np.testing.assert_array_equal(short.decision_function(X), expected)
+    pooled = voxnet(max_epochs=1, pooling=4, augment=True).fit(X, y)
+    np.testing.assert_array_equal(pooled.decision_function(X), expected, "only grids are pooled")
+    larger = voxnet(max_epochs=1).fit(np.tile(X, (1, 300)), y)
+    assert np.isfinite(larger.decision_function(np.tile(X, (1, 300)))).all(), "a side of 14"
+
+
+def test_augmentation_changes_the_training_and_not_the_answers(data):
+    X, y = data
+    parameters = {"max_epochs": 1, "rows_per_epoch": 32}
+    augmented = voxnet(augment=True, **parameters).fit(X, y)
+    plain = voxnet(**parameters).fit(X, y)
+    once, twice = (augmented.decision_function(X[:20]) for _ in range(2))
+    np.testing.assert_array_equal(once, twice)
+    assert (once != plain.decision_function(X[:20])).any()
+
+
+def test_training_drops_out_and_keeps_the_mean(rng):
+    torch.manual_seed(0)
+    dropout = Dropout(0.3)
+    inputs = torch.ones(200, 8, 5).transpose(1, 2)
+    outputs = dropout(inputs)
+    n_dropped = round(0.3 * 256)
+    assert set(outputs.unique().tolist()) == {0.0, pytest.approx(256 / (256 - n_dropped))}
+    assert outputs.mean() == pytest.approx(1, abs=0.05)
+    assert (outputs == 0).float().mean() == pytest.approx(0.3, abs=0.03)
+    assert outputs.stride() == inputs.stride()
+    assert dropout.eval()(inputs) is inputs
+
+
+def test_the_paper_s_network_has_its_layers():
+    module = VoxNet().module(3 * 32**3 // 8, packed=True)
+    shapes = [tuple(parameter.shape) for parameter in module.parameters()]
+    assert shapes == [
+        (32, 3, 5, 5, 5),
+        (32,),
+        (32, 32, 3, 3, 3),
+        (32,),
+        (128, 32 * 6**3),
+        (128,),
+        (1, 128),
+        (1,),
+    ]
