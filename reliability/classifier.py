@@ -116,7 +116,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
 
     References
     ----------
-    McConachie et al. 2020, section III, "Learning Transition Reliability".
+    McConachie et al. 2020, section IV, "Learning Transition Reliability".
 
     Examples
     --------
