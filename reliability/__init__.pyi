@@ -1,3 +1,5 @@
+from .backends import MLP as MLP
+from .backends import VoxNet as VoxNet
 from .boosting import FastHistGradientBoostingClassifier as FastHistGradientBoostingClassifier
 from .classifier import TransitionReliabilityClassifier as TransitionReliabilityClassifier
 from .collect import collect_transitions as collect_transitions

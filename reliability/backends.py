@@ -1,105 +1,223 @@
-"""The classifier's backends: their own defaults, the rows they take, the parameters they allow."""
+"""Backends: the kinds of neural network that the classifier can train."""
 
 from __future__ import annotations
 
-from typing import Any
+from abc import ABC, abstractmethod
+from functools import partial
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.base import BaseEstimator
 
-from reliability.voxel_format import LEAST_SIDE, SIDES, grid_shape
-from systems.validation import check_count, check_number
-
-_MLP = {
-    "max_epochs": 25,
-    "batch_size": 256,
-    "learning_rate": 2e-3,
-    "learning_rate_decay": 0.87,
-    "epochs_per_decay": 1,
-    "validation_fraction": 0.2,
-    "balanced_batches": False,
-}
-_VOXNET = {
-    "max_epochs": 100,
-    "batch_size": 32,
-    "learning_rate": 5e-4,
-    "learning_rate_decay": 0.8,
-    "epochs_per_decay": 4,
-    "validation_fraction": 0.1,
-    "balanced_batches": True,
-}
+from reliability.networks.hyperparameters import Hyperparameters, as_plain, check_flag
+from reliability.networks.mlp_inference import MLPInference
+from reliability.networks.voxel_format import check_pooling, grid_shape
+from systems.validation import check_count
 
 
-def resolved(estimator: Any) -> dict[str, Any]:
-    """Return the parameters of a classifier, with its backend's own in place of None."""
-    defaults = _VOXNET if estimator.backend == "voxnet" else _MLP
-    given = estimator.get_params(deep=False)
-    return {name: defaults.get(name) if v is None else v for name, v in given.items()}
+class Backend(BaseEstimator, ABC):
+    """A kind of network: its own parameters, and how it is trained unless the user says otherwise.
+
+    Torch is imported when a module is built and not before.
+
+    Attributes
+    ----------
+    defaults : Hyperparameters
+        For those that the classifier leaves at None.
+    row_types : list of type
+        Types of number that rows may have. Rows of another type are converted to the first.
+    rows_per_forward : int
+        Rows that one forward pass takes at most.
+    """
+
+    defaults: ClassVar[Hyperparameters]
+    row_types: ClassVar[list[Any]] = [np.float32]
+    rows_per_forward: ClassVar[int] = 8192
+
+    @abstractmethod
+    def check(self, n_features: int, packed: bool) -> None:
+        """Raise ``ValueError`` if a parameter is out of range or does not fit the rows.
+
+        Parameters
+        ----------
+        n_features : int
+            Columns of X.
+        packed : bool
+            Whether rows are uint8, which are bit-packed voxel grids.
+        """
+
+    @abstractmethod
+    def module(self, n_features: int, packed: bool) -> Any:
+        """Build a torch module, with random weights, that maps (n, n_features) rows to n logits."""
+
+    def inference(self, n_features: int, packed: bool, weights: dict[str, NDArray[Any]]) -> Any:
+        """Return what computes the logits of a trained module.
+
+        Parameters
+        ----------
+        n_features, packed
+            As given to :meth:`module`.
+        weights : dict of ndarray
+            The trained module's parameters and buffers by name.
+        """
+        from reliability.networks.module_inference import ModuleInference
+
+        build = partial(self.module, n_features, packed)
+        return ModuleInference(build, weights, self.rows_per_forward)
 
 
-def check_parameters(parameters: dict[str, Any]) -> None:
-    """Raise ``ValueError`` at the first parameter that is unfit."""
-    backend = parameters["backend"]
-    if backend not in ("mlp", "voxnet") and not isinstance(backend, type):
-        raise ValueError(
-            f'backend must be "mlp", "voxnet" or a class of torch modules, got {backend!r}.'
-        )
-    if not isinstance(parameters["hidden_layer_sizes"], tuple | list):
-        raise ValueError(
-            "hidden_layer_sizes must be a tuple of positive integers, "
-            f"got {parameters['hidden_layer_sizes']!r}."
-        )
-    for size in parameters["hidden_layer_sizes"]:
-        check_count(size, "Each of hidden_layer_sizes")
-    for name in ("max_epochs", "batch_size", "epochs_per_decay"):
-        check_count(parameters[name], name)
-    for name in ("patience", "rows_per_epoch"):
-        if parameters[name] is not None:
-            check_count(parameters[name], name)
-    check_number(parameters["learning_rate"], "learning_rate", 0, np.inf)
-    check_number(parameters["learning_rate_decay"], "learning_rate_decay", 0, 1)
-    check_number(parameters["validation_fraction"], "validation_fraction", 0, 1)
-    check_count(parameters["pooling"], "pooling")
-    if parameters["pooling"] not in (1, 2, 4):
-        raise ValueError(f"pooling must be 1, 2 or 4, got {parameters['pooling']}.")
-    if parameters["checkpoint"] is not None and parameters["random_state"] is None:
-        raise ValueError(
-            "checkpoint needs a random_state: without one, a training can't be begun again as it "
-            "was. Pass an integer."
-        )
+class MLP(Backend):
+    """The paper's network for the arm: fully connected layers with LeakyReLU, and one logit.
+
+    Parameters
+    ----------
+    hidden_layer_sizes : tuple of int, default=(256, 128, 64)
+        Units of each hidden layer.
+
+    References
+    ----------
+    McConachie et al. 2020, section V, "Application to a torque-limited planar arm".
+    """
+
+    defaults = Hyperparameters(
+        max_epochs=25,
+        batch_size=256,
+        learning_rate=2e-3,
+        learning_rate_decay=0.87,
+        epochs_per_decay=1,
+        validation_fraction=0.2,
+        balanced_batches=False,
+    )
+
+    def __init__(self, hidden_layer_sizes: tuple[int, ...] = (256, 128, 64)) -> None:
+        self.hidden_layer_sizes = hidden_layer_sizes
+
+    def check(self, n_features: int, packed: bool) -> None:
+        """Raise ``ValueError`` unless ``hidden_layer_sizes`` holds positive integers."""
+        if not isinstance(self.hidden_layer_sizes, tuple | list):
+            raise ValueError(
+                "hidden_layer_sizes must be a tuple of positive integers, "
+                f"got {self.hidden_layer_sizes!r}."
+            )
+        for size in self.hidden_layer_sizes:
+            check_count(size, "Each of hidden_layer_sizes")
+
+    def module(self, n_features: int, packed: bool) -> Any:
+        """Build the layers, with random weights."""
+        from reliability.networks.mlp_module import MLPModule
+
+        return MLPModule(n_features, as_plain(self.hidden_layer_sizes))
+
+    def inference(self, n_features: int, packed: bool, weights: dict[str, NDArray[Any]]) -> Any:
+        """Return the compiled forward pass, which is fast for a few rows."""
+        build = partial(self.module, n_features, packed)
+        return MLPInference(build, weights, self.rows_per_forward)
 
 
-def check_pooling(n_bytes: int, pooling: int) -> None:
-    """Raise ``ValueError`` if packed rows hold no grids, or pooling leaves too little of them."""
-    side = grid_shape(n_bytes)[1]
-    if side // pooling < LEAST_SIDE:
-        raise ValueError(
-            f"pooling must leave at least {LEAST_SIDE} cells a side, got {pooling} for grids of "
-            f"{side} (grids may have {', '.join(map(str, SIDES))})."
-        )
+class VoxNet(Backend):
+    """The paper's network for the rope: two 3-D convolutions and two full layers.
+
+    Rows of uint8 are voxel grids packed by ``np.packbits``: channels of 16, 32 or 64 cells cubed,
+    in the order channel, x, y, z, as ``Rope(features="voxels")`` gives them. Rows of floats, of
+    whatever number, are repeated until they fill a grid of one channel.
+
+    Parameters
+    ----------
+    pooling : {1, 2, 4}, default=1
+        Cells are merged into cubes of this many a side before the network sees them: into their
+        mean in the first channel, which is the surroundings, and into their maximum in the
+        others. 2 makes training and prediction about ten times as fast.
+    mixed_precision : bool, default=True
+        Compute all layers but the last in bfloat16 on devices with instructions for it. Others
+        compute in float32, as they would take ten times as long with bfloat16.
+    augment : bool, default=False
+        Train on each packed grid rotated about z by a random multiple of 90 degrees and, half of
+        the time, mirrored.
+
+    References
+    ----------
+    McConachie et al. 2020, section VI, "Application to rope manipulation". Maturana and Scherer
+    2015, "VoxNet: a 3D convolutional neural network for real-time object recognition".
+    """
+
+    defaults = Hyperparameters(
+        max_epochs=100,
+        batch_size=32,
+        learning_rate=5e-4,
+        learning_rate_decay=0.8,
+        epochs_per_decay=4,
+        validation_fraction=0.1,
+        balanced_batches=True,
+    )
+    row_types: ClassVar[list[Any]] = [np.float32, np.uint8]
+    rows_per_forward = 64
+
+    def __init__(
+        self, pooling: int = 1, mixed_precision: bool = True, augment: bool = False
+    ) -> None:
+        self.pooling = pooling
+        self.mixed_precision = mixed_precision
+        self.augment = augment
+
+    def check(self, n_features: int, packed: bool) -> None:
+        """Raise ``ValueError`` if a parameter is out of range or does not fit the grids."""
+        check_flag(self.mixed_precision, "mixed_precision")
+        check_flag(self.augment, "augment")
+        check_pooling(self.pooling)
+        if packed:
+            check_pooling(self.pooling, grid_shape(n_features)[1])
+
+    def module(self, n_features: int, packed: bool) -> Any:
+        """Build the layers, with random weights."""
+        from reliability.networks.voxnet_module import VoxNetModule
+
+        grid = grid_shape(n_features) if packed else None
+        pooling = int(self.pooling) if packed else 1
+        return VoxNetModule(n_features, grid, pooling, self.mixed_precision, self.augment)
 
 
-def check_packed(X: Any, n_features: int) -> None:
-    """Raise ``ValueError`` unless rows are packed as those that a model was trained on."""
-    found = getattr(X, "dtype", type(X).__name__)
-    if found != np.uint8:
-        channels, side = grid_shape(n_features)
-        raise ValueError(
-            f"X must hold the bit-packed grids that this model was trained on, uint8 rows of "
-            f"{n_features} bytes ({channels} channels of {side} x {side} x {side} cells), got "
-            f"{found}."
-        )
+class OwnModule(Backend):
+    """A network of the user's own.
+
+    Parameters
+    ----------
+    module_class : type
+        A class of torch modules. It is called with the number of features, and must map float32
+        rows to one logit each.
+    """
+
+    defaults = MLP.defaults
+
+    def __init__(self, module_class: type) -> None:
+        self.module_class = module_class
+
+    def check(self, n_features: int, packed: bool) -> None:
+        """Accept any rows: the module may have any parameters."""
+
+    def module(self, n_features: int, packed: bool) -> Any:
+        """Build the user's module."""
+        return self.module_class(n_features=n_features)
 
 
-def row_types(estimator: Any) -> Any:
-    """Return the types of number that a backend takes; the first is what others become."""
-    return [np.float32, np.uint8] if estimator.backend == "voxnet" else np.float32
+_SHORT_FORMS = {"mlp": MLP, "voxnet": VoxNet}
 
 
-def accuracy(estimator: Any, X: NDArray[Any], truth: NDArray[Any], rows: NDArray[np.intp]) -> float:
-    """Return the share of rows that are predicted right, taking some at a time; NaN for none."""
-    if len(rows) == 0:
-        return float("nan")
-    parts = np.array_split(rows, -(-len(rows) // 16384))
-    correct = sum(np.count_nonzero(estimator.predict(X[part]) == truth[part]) for part in parts)
-    return float(correct / len(rows))
+def as_backend(backend: Any) -> Backend:
+    """Return the backend that a user names: by an object, a short form or a class of modules.
+
+    Raises
+    ------
+    ValueError
+        If it is none of these.
+    """
+    if isinstance(backend, Backend):
+        return backend
+    if isinstance(backend, str) and backend in _SHORT_FORMS:
+        return _SHORT_FORMS[backend]()
+    if isinstance(backend, type) and not issubclass(backend, Backend):
+        return OwnModule(backend)
+    raise ValueError(
+        'backend must be "mlp", "voxnet", an object such as MLP() or VoxNet(pooling=2), or a class '
+        f"of torch modules, got {backend!r}."
+    )

@@ -1,4 +1,4 @@
-"""Reading models back, with words for what can be wrong with a file."""
+"""Reading estimators from files, with messages that say what is wrong with a file."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ class ModelFileError(ValueError):
 
 
 def load_estimator(path: str | os.PathLike[str]) -> Any:
-    """Load an estimator that ``joblib.dump`` saved, or say why it can't be.
+    """Load an estimator that ``joblib.dump`` saved.
 
-    The same as ``joblib.load`` for a sound file. Like any pickle, load only files that you trust.
+    Does what ``joblib.load`` does, and says what is wrong with a file that can't be loaded. Loading
+    runs code that the file names, as with any pickle: load only files that you trust.
 
     Parameters
     ----------
@@ -28,13 +29,13 @@ def load_estimator(path: str | os.PathLike[str]) -> Any:
     Raises
     ------
     ModelFileError
-        If the file is truncated or no joblib file, was saved by another format version, or needs
-        a class that can't be imported here.
+        If the file is truncated or no joblib file, holds no estimator, was saved in another
+        format, or needs a class that can't be imported here.
     FileNotFoundError
         If there is no such file.
     """
     try:
-        return joblib.load(path)
+        estimator = joblib.load(path)
     except (ModelFileError, FileNotFoundError):
         raise
     except (ImportError, AttributeError) as error:
@@ -47,3 +48,9 @@ def load_estimator(path: str | os.PathLike[str]) -> Any:
             f"{os.fspath(path)} is truncated or no joblib file ({error!r}); copy it again, or "
             "train and save the model again."
         ) from error
+    if not hasattr(estimator, "predict"):
+        raise ModelFileError(
+            f"{os.fspath(path)} must hold an estimator, which has the method predict, got "
+            f"{type(estimator).__name__}."
+        )
+    return estimator

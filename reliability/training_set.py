@@ -28,31 +28,31 @@ def encode_labels(y: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.intp]]:
     return np.unique(y, return_inverse=True)
 
 
-def weigh_rows(
-    y: NDArray[Any],
-    classes: NDArray[Any],
-    class_weight: dict[Any, float] | str | None,
-    sample_weight: ArrayLike | None,
-) -> NDArray[np.float64]:
-    """Return the product of each row's weight and that of its class, shape (n,).
+def check_sample_weight(sample_weight: ArrayLike | None, n_rows: int) -> NDArray[np.float64]:
+    """Return one weight per row, 1 if none are given, shape (n_rows,).
 
     Raises
     ------
     ValueError
         If ``sample_weight`` is not one finite weight per row, none of them negative.
     """
-    weight = np.ones(len(y))
-    if sample_weight is not None:
-        weight = np.array(sample_weight, dtype=np.float64)
-        if weight.shape != (len(y),) or not (np.isfinite(weight) & (weight >= 0)).all():
-            raise ValueError(
-                f"sample_weight must hold {len(y)} finite weights that are not negative, "
-                f"got the shape {weight.shape}."
-            )
-    if class_weight is not None:
-        per_class = compute_class_weight(class_weight, classes=classes, y=y)
-        weight *= per_class[np.searchsorted(classes, y)]
+    if sample_weight is None:
+        return np.ones(n_rows)
+    weight = np.array(sample_weight, dtype=np.float64)
+    if weight.shape != (n_rows,) or not (np.isfinite(weight) & (weight >= 0)).all():
+        raise ValueError(
+            f"sample_weight must hold {n_rows} finite weights that are not negative, "
+            f"got the shape {weight.shape}."
+        )
     return weight
+
+
+def weigh_classes(
+    y: NDArray[Any], classes: NDArray[Any], class_weight: dict[Any, float] | str | None
+) -> NDArray[np.float64]:
+    """Return the weight of each row's class, shape (n,)."""
+    per_class = compute_class_weight(class_weight, classes=classes, y=y)
+    return per_class[np.searchsorted(classes, y)]
 
 
 def hold_out(
@@ -84,3 +84,11 @@ def hold_out(
     splitter = ShuffleSplit if groups is None else GroupShuffleSplit
     split = splitter(1, test_size=n_held_out, random_state=seed)
     return next(split.split(np.zeros(n_rows), groups=groups))
+
+
+def thin(rows: NDArray[np.intp], n: int | None) -> NDArray[np.intp]:
+    """Return at most n of the rows, at equal distances; None takes all."""
+    if n is None or len(rows) == 0:
+        return rows
+    step = -(-len(rows) // n)
+    return rows[::step]

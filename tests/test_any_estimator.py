@@ -16,10 +16,10 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from toy_systems import Disc
 
 from planners import BiasedRRT, BiasedRRTConnect
-from reliability import TransitionReliabilityClassifier
+from reliability import MLP, TransitionReliabilityClassifier
 
 START, GOAL = np.array([-0.9, -0.1]), np.array([0.2, 0.6])
-OURS = TransitionReliabilityClassifier(hidden_layer_sizes=(32, 16), max_epochs=20, random_state=0)
+OURS = TransitionReliabilityClassifier(MLP((32, 16)), max_epochs=20, random_state=0)
 ESTIMATORS = {
     "ours": OURS,
     "forest": RandomForestClassifier(20, random_state=0),

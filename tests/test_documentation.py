@@ -83,9 +83,27 @@ def test_no_import_runs_back_up_the_road(package):
         ("pybullet", {"systems/rope/simulation/pybullet_engine.py"}),
         (
             "torch",
-            {"reliability/checkpoint.py", "reliability/networks.py", "reliability/voxnet.py"},
+            {
+                "reliability/networks/batches.py",
+                "reliability/networks/checkpoint.py",
+                "reliability/networks/devices.py",
+                "reliability/networks/metrics.py",
+                "reliability/networks/mlp_module.py",
+                "reliability/networks/module_inference.py",
+                "reliability/networks/training.py",
+                "reliability/networks/voxel_grids.py",
+                "reliability/networks/voxnet_module.py",
+            },
         ),
-        ("skorch", {"reliability/checkpoint.py", "reliability/networks.py"}),
+        (
+            "skorch",
+            {
+                "reliability/networks/checkpoint.py",
+                "reliability/networks/metrics.py",
+                "reliability/networks/progress.py",
+                "reliability/networks/training.py",
+            },
+        ),
         ("ompl", {"planners/ompl_search.py"}),
     ],
 )

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from planners.edge_discretization import split_edges
 from planners.search_tree import nearest_rows
-from reliability.mlp_kernel import mlp_logits
+from reliability.networks.mlp_inference import mlp_logits
 from systems.planar_arm.kernels import limited_targets, transition_features
 from systems.rope.rope_length import length_between
 

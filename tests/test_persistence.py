@@ -3,9 +3,11 @@
 import joblib
 import numpy as np
 import pytest
+from own_modules import TwoLayers
+from sklearn.ensemble import RandomForestClassifier
 from test_processes import run
 
-from reliability import ModelFileError, TransitionReliabilityClassifier, load_estimator
+from reliability import MLP, ModelFileError, TransitionReliabilityClassifier, load_estimator
 
 
 @pytest.fixture
@@ -61,7 +63,7 @@ def test_truncated_files_are_refused(saved, share):
 
 def test_files_of_another_format_are_refused(saved, arm_classifier, tmp_path):
     state = arm_classifier.__getstate__() | {"_format_version": 99}
-    with pytest.raises(ModelFileError, match=r"saved in format 99 with .* reads format 1. Load it"):
+    with pytest.raises(ModelFileError, match=r"saved in format 99 with .* reads format 2. Load it"):
         TransitionReliabilityClassifier().__setstate__(state)
 
 
@@ -82,3 +84,45 @@ def test_files_that_need_what_is_not_here_are_refused(tmp_path):
 def test_a_missing_file_is_missing(tmp_path):
     with pytest.raises(FileNotFoundError):
         load_estimator(tmp_path / "absent.joblib")
+
+
+@pytest.mark.parametrize("content", [3, [1], {"weights": [1.0]}, None])
+def test_files_of_something_else_are_refused(tmp_path, content):
+    joblib.dump(content, tmp_path / "model.joblib")
+    kind = type(content).__name__
+    with pytest.raises(ModelFileError, match=f"must hold an estimator, .* got {kind}"):
+        load_estimator(tmp_path / "model.joblib")
+
+
+def test_estimators_of_other_libraries_are_loaded(tmp_path, rng):
+    X = rng.normal(size=(30, 2))
+    forest = RandomForestClassifier(3, random_state=0).fit(X, X[:, 0] > 0)
+    joblib.dump(forest, tmp_path / "forest.joblib", compress=3)
+    loaded = load_estimator(str(tmp_path / "forest.joblib"))
+    np.testing.assert_array_equal(loaded.predict_proba(X), forest.predict_proba(X))
+
+
+@pytest.mark.parametrize("backend", [MLP((8,)), "voxnet", TwoLayers], ids=str)
+def test_a_loaded_model_answers_as_before_in_batches_of_any_size(backend, tmp_path, rng):
+    X = rng.normal(size=(2500, 3))
+    classifier = TransitionReliabilityClassifier(
+        backend, max_epochs=1, rows_per_epoch=64, random_state=0
+    ).fit(X[:100], X[:100, 0] > 0)
+    joblib.dump(classifier, tmp_path / "model.joblib")
+    loaded = load_estimator(tmp_path / "model.joblib")
+    for n_rows in (1, 7, 2500 if backend != "voxnet" else 70):
+        before = classifier.decision_function(X[:n_rows])
+        np.testing.assert_array_equal(loaded.decision_function(X[:n_rows]), before)
+        before = classifier.fast_decision_function(X[:n_rows])
+        np.testing.assert_array_equal(loaded.fast_decision_function(X[:n_rows]), before)
+    assert loaded.history_ == classifier.history_
+    assert loaded.validation_accuracy_ == classifier.validation_accuracy_
+    assert repr(loaded) == repr(classifier)
+
+
+def test_a_constant_answer_is_kept(tmp_path):
+    X = np.zeros((20, 2))
+    with pytest.warns(UserWarning, match="all of one class"):
+        constant = TransitionReliabilityClassifier().fit(X, np.ones(20, dtype=int))
+    joblib.dump(constant, tmp_path / "model.joblib")
+    assert load_estimator(tmp_path / "model.joblib").predict(X).tolist() == [1] * 20

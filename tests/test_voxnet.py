@@ -1,7 +1,5 @@
 """The classifier on voxel grids: learning, checkpoints, bad rows, scikit-learn's conventions."""
 
-import itertools
-
 import joblib
 import numpy as np
 import pytest
@@ -12,16 +10,18 @@ from sklearn.preprocessing import FunctionTransformer
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from planners.check_transition import CheckTransition
-from reliability import TransitionReliabilityClassifier
-from reliability.persistence import ModelFileError
-from reliability.voxnet import VoxNet, transformed, unpacked, unpacked_on_device
+from reliability import TransitionReliabilityClassifier, VoxNet
+from reliability.networks.voxel_format import grid_shape
+from reliability.networks.voxel_grids import transformed, unpacked, unpacked_on_device
+from reliability.networks.voxnet_module import Dropout
 from systems import Rope
 
 QUICK = {"max_epochs": 6, "batch_size": 16, "learning_rate": 3e-3, "random_state": 0}
 
 
-def voxnet(**parameters):
-    return TransitionReliabilityClassifier("voxnet", **QUICK | parameters)
+def voxnet(pooling=1, mixed_precision=True, augment=False, **parameters):
+    backend = VoxNet(pooling=pooling, mixed_precision=mixed_precision, augment=augment)
+    return TransitionReliabilityClassifier(backend, **QUICK | parameters)
 
 
 def packed(cells):
@@ -77,86 +77,14 @@ def test_it_learns_whether_a_band_is_near_an_obstacle(data, fitted):
     assert len(fitted.history_) == 12
 
 
-class KilledError(Exception):
-    pass
-
-
-def killed_in_epoch(monkeypatch, epoch):
-    """Have training killed in the middle of an epoch."""
-    forward, calls = VoxNet.forward, itertools.count()
-
-    def die(self, rows):
-        if next(calls) >= epoch:
-            raise KilledError
-        return forward(self, rows)
-
-    monkeypatch.setattr(VoxNet, "forward", die)
-
-
-def assert_same_fit(one, other):
-    assert one.history_ == other.history_
-    assert one.validation_accuracy_ == other.validation_accuracy_
-    for name, array in one._state.items():
-        np.testing.assert_array_equal(array, other._state[name])
-
-
-@pytest.mark.parametrize(
-    "parameters", [{}, {"patience": 2, "max_epochs": 30}, {"augment": True, "rows_per_epoch": 50}]
-)
-def test_a_killed_training_goes_on_to_the_same_end(data, tmp_path, monkeypatch, parameters):
+def test_a_longer_training_goes_on_from_its_checkpoint(data, tmp_path):
     X, y = data
-    whole = voxnet(**parameters).fit(X, y)
-    path = tmp_path / "training"
-    kept = voxnet(**parameters, checkpoint=path)
-    per_epoch = 14 if "rows_per_epoch" not in parameters else 5
-    for n_batches in (per_epoch // 2, 2 * per_epoch + 1):
-        with monkeypatch.context() as patch:
-            killed_in_epoch(patch, n_batches)
-            with pytest.raises(KilledError):
-                kept.fit(X, y)
-    assert path.exists()
-    assert_same_fit(kept.fit(X, y), whole)
-    assert_same_fit(kept.fit(X, y), whole)
-    assert [file.name for file in tmp_path.iterdir()] == ["training"]
-
-
-def test_a_training_may_be_made_longer(data, tmp_path):
-    X, y = data
-    path = tmp_path / "training"
-    voxnet(max_epochs=2, checkpoint=path).fit(X, y)
-    longer = voxnet(max_epochs=4, checkpoint=path).fit(X, y)
-    assert_same_fit(longer, voxnet(max_epochs=4).fit(X, y))
-    with pytest.raises(ModelFileError, match="holds 4 epochs, more than max_epochs = 2"):
-        voxnet(max_epochs=2, checkpoint=path).fit(X, y)
-
-
-def test_a_checkpoint_of_another_training_is_refused(data, tmp_path):
-    X, y = data
-    path = tmp_path / "training"
-    voxnet(max_epochs=1, checkpoint=path).fit(X, y)
-    for parameters, message in (
-        ({"learning_rate": 1e-3}, "learning_rate = '0.003' where this fit has '0.001'"),
-        ({"random_state": 1}, "random_state = .* where this fit has"),
-    ):
-        with pytest.raises(ModelFileError, match=message):
-            voxnet(**{"max_epochs": 1, "checkpoint": path} | parameters).fit(X, y)
-    with pytest.raises(ModelFileError, match=r"data = .* another path"):
-        voxnet(max_epochs=1, checkpoint=path).fit(X[::-1], y)
-    path.write_bytes(path.read_bytes()[:1000])
-    with pytest.raises(ModelFileError, match="is truncated or no checkpoint"):
-        voxnet(max_epochs=1, checkpoint=path).fit(X, y)
-    with pytest.raises(ValueError, match="checkpoint needs a random_state"):
-        voxnet(checkpoint=path, random_state=None).fit(X, y)
-
-
-def test_the_mlp_has_checkpoints_too(tmp_path, rng):
-    X = rng.normal(size=(100, 3))
-    parameters = {"hidden_layer_sizes": (8,), "random_state": 0, "checkpoint": tmp_path / "mlp"}
-    TransitionReliabilityClassifier(max_epochs=3, **parameters).fit(X, X[:, 0] > 0)
-    resumed = TransitionReliabilityClassifier(max_epochs=6, **parameters).fit(X, X[:, 0] > 0)
-    del parameters["checkpoint"]
-    whole = TransitionReliabilityClassifier(max_epochs=6, **parameters).fit(X, X[:, 0] > 0)
-    assert_same_fit(resumed, whole)
+    parameters = {"augment": True, "rows_per_epoch": 64}
+    voxnet(**parameters, max_epochs=1, checkpoint=tmp_path / "training").fit(X, y)
+    longer = voxnet(**parameters, max_epochs=2, checkpoint=tmp_path / "training").fit(X, y)
+    whole = voxnet(**parameters, max_epochs=2).fit(X, y)
+    assert longer.history_ == whole.history_
+    np.testing.assert_array_equal(longer.decision_function(X), whole.decision_function(X))
 
 
 @pytest.mark.parametrize("pooling", [1, 2, 4])
@@ -216,7 +144,7 @@ def test_a_model_on_disk_is_small_and_the_same(data, fitted, tmp_path):
     joblib.dump(fitted, tmp_path / "model.joblib")
     loaded = joblib.load(tmp_path / "model.joblib")
     np.testing.assert_array_equal(loaded.predict_proba(X), fitted.predict_proba(X))
-    n_weights = sum(array.size for array in fitted._state.values())
+    n_weights = 32 * (3 * 5**3 + 1) + 32 * (32 * 3**3 + 1) + 128 * (32 * 2**3 + 1) + 129
     assert (tmp_path / "model.joblib").stat().st_size < 4 * n_weights + 10_000
     loaded.set_params(device="cuda")
     joblib.dump(loaded, tmp_path / "elsewhere.joblib")
@@ -271,23 +199,67 @@ def test_planners_ask_in_batches_and_get_the_models_answers(rng):
     np.testing.assert_allclose(probability, network.predict_proba(X)[:, 1])
 
 
-def test_an_epoch_may_be_a_part_of_the_rows(data, capsys):
-    X, y = data
-    network = voxnet(max_epochs=3, rows_per_epoch=40, validation_fraction=0.5, verbose=1)
-    network.fit(X, y)
-    shown = capsys.readouterr().err
-    assert "epoch 3/3" in shown
-    assert "9/9" in shown, "batches of 16, 16 and 8 rows"
-    assert "loss=" in shown
-    assert "held-out accuracy=" in shown
-    for epoch in network.history_:
-        assert (40 * epoch["valid_accuracy"]) % 1 == pytest.approx(0, abs=1e-9)
-    assert (120 * network.validation_accuracy_) % 1 == pytest.approx(0, abs=1e-9)
-    more = voxnet(max_epochs=1, rows_per_epoch=500, balanced_batches=False).fit(X, y)
-    assert len(more.history_) == 1
-
-
 def test_diverging_training_stops_and_says_so(data):
     X, y = data
     with pytest.raises(FloatingPointError, match="Training diverged in epoch 1"):
         voxnet(learning_rate=1e38, mixed_precision=False).fit(X, y)
+
+
+@pytest.mark.parametrize("side", [16, 32, 64])
+def test_the_number_of_bytes_tells_channels_and_side(side):
+    for channels in range(1, 8):
+        assert grid_shape(channels * side**3 // 8) == (channels, side)
+    for n_bytes in (0, side**3 // 8 - 1, 11 * side**3 // 8):
+        with pytest.raises(ValueError, match=f"bit-packed grids, .* got {n_bytes} bytes a row"):
+            grid_shape(n_bytes)
+
+
+def test_floats_are_repeated_until_they_fill_a_grid(rng):
+    X = rng.normal(size=(40, 6)).astype(np.float32)
+    y = X[:, 0] > 0
+    short = voxnet(max_epochs=1).fit(X, y)
+    full = voxnet(max_epochs=1).fit(np.tile(X, (1, 12**3 // 6)), y)
+    expected = full.decision_function(np.tile(X, (1, 12**3 // 6)))
+    np.testing.assert_array_equal(short.decision_function(X), expected)
+    pooled = voxnet(max_epochs=1, pooling=4, augment=True).fit(X, y)
+    np.testing.assert_array_equal(pooled.decision_function(X), expected, "only grids are pooled")
+    larger = voxnet(max_epochs=1).fit(np.tile(X, (1, 300)), y)
+    assert np.isfinite(larger.decision_function(np.tile(X, (1, 300)))).all(), "a side of 14"
+
+
+def test_augmentation_changes_the_training_and_not_the_answers(data):
+    X, y = data
+    parameters = {"max_epochs": 1, "rows_per_epoch": 32}
+    augmented = voxnet(augment=True, **parameters).fit(X, y)
+    plain = voxnet(**parameters).fit(X, y)
+    once, twice = (augmented.decision_function(X[:20]) for _ in range(2))
+    np.testing.assert_array_equal(once, twice)
+    assert (once != plain.decision_function(X[:20])).any()
+
+
+def test_training_drops_out_and_keeps_the_mean(rng):
+    torch.manual_seed(0)
+    dropout = Dropout(0.3)
+    inputs = torch.ones(200, 8, 5).transpose(1, 2)
+    outputs = dropout(inputs)
+    n_dropped = round(0.3 * 256)
+    assert outputs.unique().tolist() == pytest.approx([0.0, 256 / (256 - n_dropped)])
+    assert outputs.mean() == pytest.approx(1, abs=0.05)
+    assert (outputs == 0).float().mean() == pytest.approx(0.3, abs=0.03)
+    assert outputs.stride() == inputs.stride()
+    assert dropout.eval()(inputs) is inputs
+
+
+def test_the_network_has_the_papers_layers():
+    module = VoxNet().module(3 * 32**3 // 8, packed=True)
+    shapes = [tuple(parameter.shape) for parameter in module.parameters()]
+    assert shapes == [
+        (32, 3, 5, 5, 5),
+        (32,),
+        (32, 32, 3, 3, 3),
+        (32,),
+        (128, 32 * 6**3),
+        (128,),
+        (1, 128),
+        (1,),
+    ]

@@ -11,6 +11,7 @@ import numpy as np
 from benchmarks.car.compared_planners import careful_planner
 from planners import BiasedRRTConnect
 from reliability import (
+    MLP,
     RELIABLE,
     TransitionReliabilityClassifier,
     Transitions,
@@ -91,7 +92,7 @@ def train(transitions: Transitions, X: np.ndarray, class_weight: Any) -> Any:
     """Train on whole plans."""
     kept = informative(transitions)
     classifier = TransitionReliabilityClassifier(
-        hidden_layer_sizes=(64, 64),
+        MLP(hidden_layer_sizes=(64, 64)),
         max_epochs=30,
         class_weight=class_weight,
         random_state=TRAINING_SEED,

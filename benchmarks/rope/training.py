@@ -27,6 +27,7 @@ from benchmarks.rope.collection import (
 from reliability import (
     FastHistGradientBoostingClassifier,
     TransitionReliabilityClassifier,
+    VoxNet,
     __version__,
 )
 from systems.rope.features.clearance import mirrored, reversed_ends
@@ -87,8 +88,7 @@ def train_paper(simple_hook: SceneData, checkpoint: Path) -> Any:
     X, y, plans = described([simple_hook], "voxels")
     training, apart = _split(y, plans, HELD_OUT)
     classifier = TransitionReliabilityClassifier(
-        "voxnet",
-        pooling=2,
+        VoxNet(pooling=2),
         rows_per_epoch=40_000,
         checkpoint=str(checkpoint),
         random_state=TRAINING_SEED,

@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks.rope.table1 import COLUMNS
 from benchmarks.speed.rope_engines import measure
 from planners import BiasedRRT
-from reliability import TransitionReliabilityClassifier, load_estimator
+from reliability import TransitionReliabilityClassifier, VoxNet, load_estimator
 from systems import Rope
 
 SCENES = ("simple_hook_short", "simple_hook", "simple_hook_long", "simple_hook_very_long")
@@ -59,7 +59,7 @@ def print_voxnet(rope: Rope) -> None:
     print("|" + "---|" * (5 + len(BATCHES)))
     for pooling in (1, 2):
         network = TransitionReliabilityClassifier(
-            "voxnet", pooling=pooling, max_epochs=1, rows_per_epoch=64, random_state=0
+            VoxNet(pooling=pooling), max_epochs=1, rows_per_epoch=64, random_state=0
         ).fit(rows, labels)
         judge = network.fast_decision_function
         rates = [rate(lambda n=n, judge=judge: judge(rows[:n]), n) for n in BATCHES]

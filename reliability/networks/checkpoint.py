@@ -3,60 +3,53 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import os
-from collections.abc import Iterable
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from skorch import NeuralNet
 from skorch.callbacks import Callback
 from skorch.history import History
 
 from reliability.persistence import ModelFileError
 
-FORMAT_VERSION = 1
-_BYTES_AT_ONCE = 2**26
-
-
-def digest(arrays: Iterable[NDArray[Any]]) -> str:
-    """Return a digest of arrays, read piece by piece."""
-    total = hashlib.blake2b(digest_size=16)
-    for array in arrays:
-        total.update(f"{array.dtype.str} {array.shape}".encode())
-        n_rows = max(1, _BYTES_AT_ONCE // max(1, array[:1].nbytes))
-        for first in range(0, len(array), n_rows):
-            total.update(np.ascontiguousarray(array[first : first + n_rows]).data)
-    return total.hexdigest()
+# A file begins with this line and the digest of all that follows them.
+_FIRST_LINE = b"transition-reliability checkpoint, format 2\n"
+_DIGEST_BYTES = 16
 
 
 class Checkpoint(Callback):
     """Writes all that a training needs to go on, after each epoch, and reads it at the start.
 
-    It must be the last callback. It keeps the state of ``decay`` and of ``stop``.
+    It must be the last callback.
 
     Parameters
     ----------
     path : path-like
-    provenance : dict
-        What the training is determined by, as strings and numbers: a file of another is refused.
+    identity : dict of str
+        What the outcome of the training depends on. The file of a training with another identity
+        is refused.
     decay : LRScheduler
+        Its state is kept too.
     stop : EarlyStopping or None
+        Its state is kept too.
     """
 
     def __init__(
-        self, path: str | os.PathLike[str], provenance: dict[str, Any], decay: Any, stop: Any
+        self, path: str | os.PathLike[str], identity: dict[str, str], decay: Any, stop: Any
     ) -> None:
         self.path = Path(path)
-        self.provenance = provenance
+        self.identity = identity
         self.decay = decay
         self.stop = stop
 
     def on_train_begin(self, net: NeuralNet, **kwargs: Any) -> None:
         """Go on from the file, if there is one."""
+        self._check_writable()
         if self.path.exists():
             self._restore(net, self._read(net.max_epochs))
 
@@ -65,17 +58,31 @@ class Checkpoint(Callback):
         self._write(net)
 
     def on_train_end(self, net: NeuralNet, **kwargs: Any) -> None:
-        """Write the file of a training that stopped early, which skips the callbacks behind."""
+        """Write the file of a training that stopped early, in which no later callback is called."""
         if self._has_stopped():
             self._write(net)
+
+    @property
+    def _partial(self) -> Path:
+        return self.path.with_name(self.path.name + ".partial")
+
+    def _check_writable(self) -> None:
+        try:
+            if self.path.is_dir():
+                raise IsADirectoryError("it is a folder")
+            self._partial.write_bytes(b"")
+            self._partial.unlink()
+        except OSError as error:
+            raise ValueError(
+                f"checkpoint must be a file that can be written, got {str(self.path)!r}: {error}."
+            ) from error
 
     def _has_stopped(self) -> bool:
         return self.stop is not None and self.stop.misses_ >= self.stop.patience
 
     def _write(self, net: NeuralNet) -> None:
         state = {
-            "format_version": FORMAT_VERSION,
-            "provenance": self.provenance,
+            "identity": self.identity,
             "module": net.module_.state_dict(),
             "optimizer": net.optimizer_.state_dict(),
             "decay": _plain(self.decay.lr_scheduler_.state_dict()),
@@ -84,27 +91,18 @@ class Checkpoint(Callback):
             "generator": torch.get_rng_state(),
             "device_generator": _device_generator(net.device),
         }
-        partial = self.path.with_name(self.path.name + ".partial")
-        torch.save(state, partial)
-        os.replace(partial, self.path)
+        content = io.BytesIO()
+        torch.save(state, content)
+        data = content.getvalue()
+        self._partial.write_bytes(_FIRST_LINE + _digest(data) + data)
+        os.replace(self._partial, self.path)
 
     def _read(self, max_epochs: int) -> dict[str, Any]:
-        try:
-            state: dict[str, Any] = torch.load(self.path, map_location="cpu", weights_only=True)
-            found, version = state["provenance"], state["format_version"]
-        except Exception as error:
-            raise ModelFileError(
-                f"{self.path} is truncated or no checkpoint ({error!r}); delete it to train anew."
-            ) from error
-        if version != FORMAT_VERSION:
-            raise ModelFileError(
-                f"{self.path} has the checkpoint format {version}, expected {FORMAT_VERSION}; "
-                "delete it to train anew."
-            )
+        state = _checked_state(self.path)
         differing = [
-            f"{name} = {found.get(name)!r} where this fit has {wanted!r}"
-            for name, wanted in self.provenance.items()
-            if found.get(name) != wanted
+            f"{name} = {state['identity'].get(name)} where this fit has {wanted}"
+            for name, wanted in self.identity.items()
+            if state["identity"].get(name) != wanted
         ]
         if differing:
             raise ModelFileError(
@@ -132,6 +130,27 @@ class Checkpoint(Callback):
             torch.cuda.set_rng_state(state["device_generator"], net.device)
 
 
+def _checked_state(path: Path) -> dict[str, Any]:
+    """Read a file, and raise ``ModelFileError`` if it is not as it was written."""
+    content = path.read_bytes()
+    if not content.startswith(_FIRST_LINE):
+        raise ModelFileError(
+            f"{path} is no checkpoint of this version of the library; delete it to train anew."
+        )
+    begin = len(_FIRST_LINE) + _DIGEST_BYTES
+    digest, data = content[len(_FIRST_LINE) : begin], content[begin:]
+    if digest != _digest(data):
+        raise ModelFileError(
+            f"{path} is truncated or damaged: its content is not that which was written. Delete it "
+            "to train anew."
+        )
+    return torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
+
+
+def _digest(data: bytes) -> bytes:
+    return hashlib.blake2b(data, digest_size=_DIGEST_BYTES).digest()
+
+
 def _device_generator(device: str) -> torch.Tensor | None:
     return torch.cuda.get_rng_state(device) if device.startswith("cuda") else None
 
@@ -142,7 +161,7 @@ def _stop_state(stop: Any) -> dict[str, Any]:
 
 
 def _plain(row: dict[str, Any]) -> dict[str, Any]:
-    """Turn numpy's numbers into Python's, which load without running any code."""
+    """Turn numpy's numbers into Python's, which are read back without running any code."""
     return {
         name: value.item() if isinstance(value, np.generic) else value
         for name, value in row.items()

@@ -1,0 +1,162 @@
+"""Training of a network, which skorch carries out."""
+
+from __future__ import annotations
+
+import os
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from skorch import NeuralNet
+from skorch.callbacks import Callback, EarlyStopping, LRScheduler
+from skorch.helper import predefined_split
+
+from reliability.networks.batches import Batches, LabelledRows, digest
+from reliability.networks.checkpoint import Checkpoint
+from reliability.networks.devices import check_device, one_thread
+from reliability.networks.hyperparameters import Hyperparameters, as_plain
+from reliability.networks.metrics import EpochMetrics, WeightedLoss
+from reliability.networks.progress import ProgressBar
+
+# A training and its continuation may differ in this.
+_FREE = {"max_epochs"}
+_RECORDED = ("epoch", "train_loss", "valid_loss", "valid_accuracy")
+
+
+class TrainingTask(NamedTuple):
+    """What to train, on what, and how."""
+
+    backend: Any
+    training: LabelledRows
+    held_out: LabelledRows
+    hyperparameters: Hyperparameters
+    seed: int
+    device: str
+    checkpoint: str | os.PathLike[str] | None
+    verbose: int
+
+
+def train(task: TrainingTask) -> tuple[dict[str, NDArray[Any]], list[dict[str, float]]]:
+    """Train a network on weighted rows.
+
+    Torch's global random generators are left as they were.
+
+    Returns
+    -------
+    weights : dict of ndarray
+        The module's parameters and buffers by name.
+    history : list of dict
+        Per epoch: epoch, train_loss and, with held-out rows, valid_loss and valid_accuracy.
+
+    Raises
+    ------
+    ValueError
+        If there is no such device, or the checkpoint can't be written.
+    FloatingPointError
+        If the loss stops being finite.
+    ModelFileError
+        If the checkpoint is damaged, or of another training.
+    KeyboardInterrupt
+        If the user interrupts.
+    """
+    check_device(task.device)
+    cuda_devices = [task.device] if task.device.startswith("cuda") else []
+    stop = _early_stopping(task)
+    with one_thread(), torch.random.fork_rng(cuda_devices):
+        torch.manual_seed(task.seed)
+        net = _network(task, _callbacks(task, stop))
+        net.fit(task.training)
+    history = net.history.to_list()
+    # skorch ends the training quietly when the user interrupts it.
+    is_whole = len(history) == task.hyperparameters.max_epochs and "train_loss" in history[-1]
+    if not is_whole and not _has_stopped(stop):
+        raise KeyboardInterrupt
+    tensors = net.module_.state_dict().items()
+    weights = {name: tensor.detach().cpu().numpy().copy() for name, tensor in tensors}
+    rows = [{name: as_plain(row[name]) for name in _RECORDED if name in row} for row in history]
+    return weights, rows
+
+
+def _network(task: TrainingTask, callbacks: list[tuple[str, Callback]]) -> NeuralNet:
+    rows, chosen = task.training.rows, task.hyperparameters
+    return NeuralNet(
+        partial(task.backend.module, rows.shape[1], rows.dtype == np.uint8),
+        criterion=WeightedLoss,
+        optimizer=torch.optim.Adam,
+        optimizer__fused=True,
+        lr=chosen.learning_rate,
+        max_epochs=chosen.max_epochs,
+        batch_size=chosen.batch_size,
+        iterator_train=Batches,
+        iterator_train__shuffle=True,
+        iterator_train__balanced=chosen.balanced_batches,
+        iterator_train__n_rows=_rows_per_epoch(task),
+        iterator_valid=Batches,
+        iterator_valid__batch_size=task.backend.rows_per_forward,
+        train_split=predefined_split(task.held_out) if len(task.held_out) else None,
+        callbacks=callbacks,
+        callbacks__print_log=None,
+        device=task.device,
+        verbose=0,
+    )
+
+
+def _callbacks(task: TrainingTask, stop: EarlyStopping | None) -> list[tuple[str, Callback]]:
+    chosen = task.hyperparameters
+    decay = LRScheduler(
+        torch.optim.lr_scheduler.StepLR,
+        step_size=chosen.epochs_per_decay,
+        gamma=chosen.learning_rate_decay,
+    )
+    callbacks: list[tuple[str, Callback]] = [("metrics", EpochMetrics()), ("decay", decay)]
+    if task.verbose:
+        n_batches = -(-_rows_per_epoch(task) // chosen.batch_size)
+        callbacks.insert(0, ("progress", ProgressBar(chosen.max_epochs, n_batches)))
+    if stop is not None:
+        callbacks.append(("stop", stop))
+    if task.checkpoint is not None:
+        # The last, as it keeps the state of the others.
+        checkpoint = Checkpoint(task.checkpoint, _identity(task), decay, stop)
+        callbacks.append(("checkpoint", checkpoint))
+    return callbacks
+
+
+def _early_stopping(task: TrainingTask) -> EarlyStopping | None:
+    patience = task.hyperparameters.patience
+    if patience is None or not len(task.held_out):
+        return None
+    return EarlyStopping(
+        "valid_loss", patience=patience, threshold=0.0, load_best=True, sink=_no_output
+    )
+
+
+def _has_stopped(stop: EarlyStopping | None) -> bool:
+    return stop is not None and stop.misses_ >= stop.patience
+
+
+def _rows_per_epoch(task: TrainingTask) -> int:
+    return task.hyperparameters.rows_per_epoch or len(task.training)
+
+
+def _identity(task: TrainingTask) -> dict[str, str]:
+    """Return what the outcome of a training depends on, in words that a user can compare."""
+    backend = task.backend.get_params(deep=False)
+    chosen = {k: v for k, v in vars(task.hyperparameters).items() if k not in _FREE}
+    values = {"backend": type(task.backend).__name__, **backend, **chosen}
+    values |= {"device": task.device, "seed drawn from random_state": task.seed}
+    values |= {"torch": str(torch.__version__)}
+    selected = {
+        "digest of the training rows": task.training.index,
+        "digest of the held-out rows": task.held_out.index,
+    }
+    return (
+        {name: repr(as_plain(value)) for name, value in values.items()}
+        | task.training.digests()
+        | {name: digest(index) for name, index in selected.items()}
+    )
+
+
+def _no_output(*text: object) -> None:
+    pass
