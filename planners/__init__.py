@@ -1,4 +1,4 @@
-"""Planners that distrust: biased RRT and RRT-Connect on OMPL, for any estimator."""
+"""Planners for OMPL that avoid transitions which an estimator calls Unreliable."""
 
 import lazy_loader
 

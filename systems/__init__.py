@@ -1,4 +1,4 @@
-"""Systems: a robot in one scene, with its reduced model g and its true execution Γ."""
+"""Systems: a robot in one scene, with a reduced model g and a true execution Γ."""
 
 import lazy_loader
 

@@ -16,9 +16,9 @@ def wrap_angle(angle: float) -> float:
     """Return an angle plus the multiple of 2π that brings it to [-π, π)."""
     if -np.pi <= angle < np.pi:
         return angle
-    # Rounding can give π itself, which is -π.
+    # At the ends of the range, rounding can lead out of it.
     wrapped = angle - TURN * np.floor((angle + np.pi) / TURN)
-    return wrapped if wrapped < np.pi else -np.pi
+    return wrapped if -np.pi <= wrapped < np.pi else -np.pi
 
 
 def wrap_columns(rows: Array, angular: tuple[int, ...]) -> Array:

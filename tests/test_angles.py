@@ -26,12 +26,20 @@ def test_an_angle_in_range_stays_as_it_is(angle):
     assert wrap_angle(angle) == angle
 
 
-@pytest.mark.parametrize("turns", [1, 3, 100, 10**6])
-@pytest.mark.parametrize("angle", [np.pi, -np.pi, np.nextafter(-np.pi, -4)])
-def test_the_ends_of_the_range_are_one_angle(angle, turns):
-    wrapped = wrap_angle(angle + 2 * np.pi * turns)
-    assert -np.pi <= wrapped < np.pi
-    assert abs(wrapped) == pytest.approx(np.pi, abs=1e-8)
+@pytest.mark.parametrize("neighbour", [-2, -1, 0, 1, 2])
+def test_the_ends_of_the_range_are_one_angle(neighbour):
+    for turns in [*range(-300, 300), 10**6]:
+        angle = np.pi + 2 * np.pi * turns
+        wrapped = wrap_angle(angle + neighbour * np.spacing(angle))
+        assert -np.pi <= wrapped < np.pi
+        assert abs(wrapped) == pytest.approx(np.pi, abs=1e-8)
+
+
+@settings(deadline=None, derandomize=True)
+@given(st.floats(-1e15, 1e15))
+def test_rounding_never_leads_out_of_the_range(angle):
+    for at in (angle, np.pi * np.round(angle / np.pi), 4.58952998e12):
+        assert -np.pi <= wrap_angle(at) < np.pi
 
 
 @settings(deadline=None, derandomize=True)

@@ -191,6 +191,18 @@ def test_clearance_is_that_of_a_slow_reference(seed):
             assert room < 0
 
 
+@pytest.mark.parametrize("width", [0.01, 0.1])
+@pytest.mark.parametrize("heading", [0.0, 0.5, np.pi])
+def test_a_thin_post_between_the_axles_is_contact(width, heading):
+    half = 0.5 * width
+    post = ((-half, -half), (half, -half), (half, half), (-half, half))
+    car = Car(CarScene((ConvexPolygon(post),), (-5.0, -5.0, 5.0, 5.0)))
+    rear = -0.15 * np.array([np.cos(heading), np.sin(heading)])
+    astride = np.array([[*rear, heading]])
+    assert car.clearance(astride)[0] == pytest.approx(-0.15)
+    assert not car.propagate(astride, np.zeros((1, 3)))[1][0]
+
+
 @settings(max_examples=20, deadline=None, derandomize=True)
 @given(seeds, st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3))
 def test_features_do_not_depend_on_where_the_car_is(seed, dx, dy, turn):

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from systems import Car, CarScene, Circle
+from systems import Car, CarScene, Circle, random_car_scene
 
 TIME_STEP = 0.01
 WHEELBASE = 0.3
@@ -115,3 +115,87 @@ def test_turning_wheels_can_be_seen_in_the_heading():
     assert left[STEERING] > 0
     right = OPEN.execute([[0, 0, 0, -0.5, 0]], [[-0.5, 0.1, -0.4]])[0][0]
     assert right[HEADING] == pytest.approx(-0.4, abs=0.1)
+
+
+def plain_wrap(angle):
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+def plain_step(state, speed, curvature, duration):
+    """One short time of the true car, from its limits."""
+    x, y, heading, v, steering = state
+    limit = min(np.tan(0.55) / WHEELBASE, 2.0 / max(v**2, 1e-6))
+    wanted = np.arctan(WHEELBASE * np.clip(curvature, -limit, limit))
+    steering += np.clip(wanted - steering, -6.0 * duration, 6.0 * duration)
+    faster = np.clip(speed - v, -2.0 * duration, 2.0 * duration)
+    way = (v + faster / 2) * duration
+    turn = way * np.clip(np.tan(steering) / WHEELBASE, -limit, limit)
+    along = heading + turn / 2
+    moved = [x + way * np.cos(along), y + way * np.sin(along)]
+    return np.array([*moved, plain_wrap(heading + turn), v + faster, steering])
+
+
+def plain_controls(state, target, forwards):
+    """The arc to the target in the wanted heading, as if the car had turned round in reverse."""
+    x, y, heading, v, _ = state
+    sign = 1 if forwards else -1
+    if v * sign < 0:
+        return sign * 1.2, 0.0
+    travel, arrival = (heading, target[2]) if forwards else (heading + np.pi, target[2] + np.pi)
+    away = target[:2] - [x, y]
+    bearing, distance = np.arctan2(away[1], away[0]), np.linalg.norm(away)
+    bend = np.clip(plain_wrap(arrival - bearing), -1.2, 1.2)
+    error = plain_wrap(bearing - bend - travel)
+    curvature = (2 * np.sin(bend) + 2.5 * error) / max(0.25, distance)
+    tight = np.clip(abs(curvature), 1e-6, np.tan(0.55) / WHEELBASE)
+    speed = min(1.2, np.sqrt(0.3**2 + 2 * 2.0 * distance), np.sqrt(2.0 / tight))
+    return sign * speed, sign * curvature
+
+
+def plain_execution(car, start, command):
+    """Γ with the clearance looked at after every step; returns the last state and if it arrived."""
+    target, state = start[:3] + command, start
+    braking = np.linalg.norm(command[:2]) < 1e-3
+    middle = start[2] + command[2] / 2
+    forwards = command[0] * np.cos(middle) + command[1] * np.sin(middle) >= 0
+    for _ in range(400):
+        if braking and state[SPEED] == 0:
+            break
+        controls = (0.0, 0.0) if braking else plain_controls(state, target, forwards)
+        moved, duration = plain_step(state, *controls, TIME_STEP), TIME_STEP
+        before, left = (np.dot(command[:2], target[:2] - s[:2]) for s in (state, moved))
+        arrives = not braking and left <= 0
+        if arrives:
+            duration *= before / (before - left)
+            moved = plain_step(state, *controls, duration)
+        if car.clearance(moved[None, :3])[0] < 1e-3:
+            return last_free(car, state, controls, duration), False
+        state = moved
+        if arrives:
+            break
+    return state, True
+
+
+def last_free(car, state, controls, duration):
+    low, high = 0.0, duration
+    for _ in range(40):
+        half = (low + high) / 2
+        moved = plain_step(state, *controls, half)
+        low, high = (half, high) if car.clearance(moved[None, :3])[0] >= 1e-3 else (low, half)
+    return plain_step(state, *controls, low)
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(seeds)
+def test_execution_agrees_with_a_plain_one(seed):
+    rng = np.random.default_rng(seed)
+    car = Car(random_car_scene(rng))
+    poses = rng.uniform(*car.bounds, size=(60, 3))
+    poses = poses[car.clearance(poses) > 1e-3][:4]
+    starts = np.column_stack([poses, rng.uniform(-2, 2, 4), rng.uniform(-0.55, 0.55, 4)])
+    commands = rng.normal(size=(4, 3)) * [[0.0], [0.2], [0.5], [1.0]]
+    ends, completed = car.execute(starts, commands)
+    for start, command, end, done in zip(starts, commands, ends, completed, strict=True):
+        expected, arrived = plain_execution(car, start, command)
+        assert done == arrived
+        np.testing.assert_allclose(end, expected, atol=1e-6)

@@ -87,6 +87,12 @@ def test_other_numbers_are_refused(value):
         check_number(value, "k", 2, 5)
 
 
+@pytest.mark.parametrize("truth", [True, np.bool_(True)])
+def test_truth_is_no_number(truth):
+    with pytest.raises(ValueError, match="k must be a number between 0 and 1, got"):
+        check_number(truth, "k", 0, 1)
+
+
 def test_arrays_become_float64_and_fitting_ones_stay_themselves():
     array = np.arange(6.0).reshape(2, 3)
     assert as_finite_array(array, "a", (None, 3)) is array
