@@ -128,3 +128,42 @@ def test_bad_rows_are_refused():
     ):
         with pytest.raises(ValueError, match=message):
             call()
+
+
+def test_a_box_fills_the_cells_whose_centres_it_holds_whatever_its_place(rng):
+    """Boxes are filled in by whole columns along z, from their lowest cell to their highest."""
+    start = np.array([[-0.1, 0.0, 2.0], [0.1, 0.0, 2.0]])
+    bounds = np.array([[-9.0] * 3, [9.0] * 3])
+    for _ in range(40):
+        low = rng.uniform(-0.2, 0.1, size=3)
+        high = low + rng.uniform(0.0005, 0.3, size=3)
+        box = Box(tuple(0.5 * (low + high)), tuple(0.5 * (high - low)))
+        scene = Scene([box], bounds, 0.32, start, start, max_stretch=1.0)
+        row = np.zeros((1, reduced_dim(scene)))
+        surroundings = unpack_voxels(voxel_features(row, row, scene))[0, 0]
+        centers = -0.16 + 0.01 * (np.arange(32) + 0.5)
+        inside = [
+            (box.center[k] - box.half_extents[k] <= centers)
+            & (centers <= box.center[k] + box.half_extents[k])
+            for k in range(3)
+        ]
+        expected = np.einsum("i,j,k->ijk", *(each.astype(np.uint8) for each in inside))
+        np.testing.assert_array_equal(surroundings, expected)
+
+
+def test_grids_move_along_with_their_bands(rng):
+    scene = load_scene("simple_hook")
+    before = random_bands(scene, rng, 10)
+    after = successors(before, rng)
+    shift = np.array([0.25, -0.5, 0.125])
+    moved = [Box(tuple(np.add(each.center, shift)), each.half_extents) for each in scene.obstacles]
+    there = Scene(
+        moved, scene.bounds + shift, scene.rope_length, scene.start + shift, scene.goal + shift
+    )
+    everywhere = np.tile(shift, before.shape[1] // 3)
+    here = unpack_voxels(voxel_features(before, after, scene))
+    shifted = unpack_voxels(voxel_features(before + everywhere, after + everywhere, there))
+    # Rounding may take a point that is on the face between two cells to the other one.
+    assert (here != shifted).mean() < 1e-5
+    swapped = unpack_voxels(voxel_features(after, before, scene))
+    np.testing.assert_array_equal(swapped[:, [0, 2, 1]], here)

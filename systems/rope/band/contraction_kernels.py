@@ -2,20 +2,26 @@ r"""Compiled contraction of an elastic band: pulling it taut without crossing an
 
 The band is a chain of points (see :mod:`systems.rope.band.chain_kernels`) that is swept from end
 to end, point by point, until a sweep changes nothing. A point between its neighbours ``before``
-and ``after`` takes its turn as follows::
+and ``after`` takes its turn as follows:
 
-      before           after         1. If the band may cut straight from before to after, the
-         o . . . . . . . o              point is removed.
-          \      ^      /           2. Else the point is moved along ``pull``, towards the
-           \     | pull/               straight line, as far as that shortens the band.
-            \    |    /
-             \   |   /
-              \  |  /
-                point
-                                     3. If an obstacle is in the way of one of the segments, that
-      before      [obstacle]            segment is bent around it by a new point, or
-         o-----bend---.                 4. the point slides along the obstacle instead.
-                       new----- after
+1. If the band may cut straight from ``before`` to ``after``, the point is removed.
+2. Else it is pulled towards the straight line between them, as far as that shortens the band::
+
+      before . . . . . . . after
+           \       ^      /
+            \      |pull /
+             \     |    /
+              `---point'
+
+3. If an obstacle is in the way of one of the two segments, that segment is bent around the obstacle
+   by a new point::
+
+      before . [########]. after
+           \   [########]  /
+            bend---------new
+
+4. Else the point slides along the obstacle: it is pulled only in the directions that do not press
+   the segment against it.
 
 Every change is certified by bubbles, balls as large as the distance to the obstacles at their
 centre: they have to cover the new segments and the area that the old ones sweep on their way

@@ -39,14 +39,14 @@ _NONE, _ALL = np.uint32(0), np.uint32(0xFFFFFFFF)
 
 
 @compiled(inline="always")
-def cells_below(k: int) -> np.uint32:
-    """Mark the lowest k cells of a column."""
+def cells_from(k: int) -> np.uint32:
+    """Mark the cells of a column from the k-th lowest on, counted from 0."""
     return _ALL if k <= 0 else np.uint32((np.uint64(1) << np.uint64(SIDE - k)) - np.uint64(1))
 
 
 @compiled
 def index_range(centers: Any, middle: float, half: float) -> tuple[int, int]:
-    """First index whose centre is within ``half`` of ``middle``, and the one after the last."""
+    """Return the first index whose centre is within ``half`` of ``middle``, and the end."""
     first, end = 0, centers.shape[0]
     while first < end and abs(centers[first] - middle) - half > 0.0:
         first += 1
@@ -58,7 +58,7 @@ def index_range(centers: Any, middle: float, half: float) -> tuple[int, int]:
 @compiled(inline="always")
 def column(first: int, end: int) -> np.uint32:
     """Mark the cells of a column from ``first`` up to ``end``."""
-    return cells_below(first) & ~(cells_below(end) if end > 0 else _ALL)
+    return cells_from(first) & ~cells_from(end)
 
 
 @compiled

@@ -27,8 +27,7 @@ from systems.validation import as_finite_array
 # Near the largest allowed stretch the grippers' strides shorten, so that the execution ends close
 # to it. Metres.
 SHORTEST_STRIDE = 0.001
-# So much shorter than the limit, in metres, the rope's length is an upper bound that needs no
-# measuring.
+# Metres: a rope that is shorter than the limit by at least this much is not measured.
 LENGTH_MARGIN = 0.01
 # Time steps until a rope that is laid somewhere has come to rest.
 SETTLING_STEPS = 800
