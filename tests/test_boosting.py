@@ -10,10 +10,17 @@ from sklearn.model_selection import cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import parametrize_with_checks
+from threadpoolctl import threadpool_limits
 from toy_systems import Disc
 
 from planners import BiasedRRT, BiasedRRTConnect
 from reliability import FastHistGradientBoostingClassifier, load_estimator
+
+
+@pytest.fixture(autouse=True, scope="module")
+def one_thread():
+    with threadpool_limits(1, user_api="openmp"):
+        yield
 
 
 def expected_failures(estimator):
