@@ -31,6 +31,7 @@ from sklearn.tree import DecisionTreeClassifier, ExtraTreeClassifier
 from threadpoolctl import threadpool_limits
 
 from reliability import (
+    MLP,
     FastHistGradientBoostingClassifier,
     TransitionReliabilityClassifier,
     compile_inference,
@@ -43,9 +44,7 @@ N_FEATURES = 4
 TREE = DecisionTreeClassifier(max_depth=6, random_state=0)
 FOREST = RandomForestClassifier(7, random_state=0)
 BOOSTING = HistGradientBoostingClassifier(max_iter=6, min_samples_leaf=5, random_state=0)
-OURS = TransitionReliabilityClassifier(
-    hidden_layer_sizes=(8,), max_epochs=3, batch_size=32, random_state=0
-)
+OURS = TransitionReliabilityClassifier(MLP((8,)), max_epochs=3, batch_size=32, random_state=0)
 
 MODELS = {
     "tree": TREE,
@@ -338,7 +337,7 @@ def test_what_is_not_known_is_left_to_the_public_methods():
         HistGradientBoostingClassifier(max_iter=2, categorical_features=[2]).fit(whole, y),
         Strict(3).fit(X, y),
         StrictBoosting(max_iter=2).fit(X, y),
-        StrictOurs(max_epochs=1, hidden_layer_sizes=(4,)).fit(X, y),
+        StrictOurs(MLP((4,)), max_epochs=1).fit(X, y),
         make_pipeline(StandardScaler(), Strict(3)).fit(X, y),
         FixedThresholdClassifier(Halves()),
         FixedThresholdClassifier(clone(FOREST), response_method="decision_function", threshold=0),
