@@ -246,6 +246,13 @@ def test_as_good_as_before_is_no_improvement(monkeypatch):
     assert len(classifier.history_) == 3
 
 
+def test_a_slightly_smaller_loss_is_an_improvement(monkeypatch):
+    monkeypatch.setattr(Scripted, "script", tuple(0.5 + 0.001 * i for i in range(8)))
+    classifier = small(Scripted, max_epochs=8, batch_size=N, patience=1)
+    classifier.fit(np.where(LABELS, 1.0, -1.0)[:, None], LABELS)
+    assert len(classifier.history_) == 8
+
+
 def test_early_stopping_looks_at_weighted_rows_only():
     held_out = hold_out(N, None, 0.2, np.random.default_rng(0))[1]
     X = np.where(LABELS, 1.0, -1.0)[:, None]
@@ -293,7 +300,7 @@ def test_a_learning_rate_of_zero_leaves_the_weights_as_they_were_drawn(rng):
 def test_an_interrupted_training_is_not_taken_for_a_finished_one(batch, monkeypatch, rng):
     monkeypatch.setattr(Mortal, "lives", batch - 1)
     monkeypatch.setattr(Mortal, "error", KeyboardInterrupt)
-    classifier = small(Mortal, max_epochs=3, batch_size=48, patience=1)  # Two batches an epoch.
+    classifier = small(Mortal, max_epochs=3, batch_size=48, patience=5)  # Two batches an epoch.
     with pytest.raises(KeyboardInterrupt):
         classifier.fit(rng.normal(size=(N, 2)), LABELS)
 
