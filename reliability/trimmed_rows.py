@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 # Coordinates of a point: a band that is shorter than its row repeats its last point.
 PERIOD = 3
+# Far above any reduced state; a file that claims more would fill the memory when it is unpacked.
+LARGEST_WIDTH = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,11 +42,32 @@ class TrimmedRows:
         """Pack rows of shape (n_rows, width)."""
         bits = as_bits(rows)
         width = bits.shape[1]
+        if width > LARGEST_WIDTH:
+            raise ValueError(f"rows must be {LARGEST_WIDTH} numbers wide at most, got {width}.")
         differs = np.ones((len(bits), max(width - PERIOD, 0) + 1), dtype=np.bool_)
         differs[:, 1:] = bits[:, PERIOD:] != bits[:, :-PERIOD]
         lengths = width - np.argmax(differs[:, ::-1], axis=1)
         kept = np.arange(width) < lengths[:, None]
         return cls(np.asarray(rows, dtype=np.float64)[kept], lengths, width)
+
+    def check(self) -> None:
+        """Raise ``ValueError`` unless the three belong together."""
+        if self.values.dtype != np.float64 or self.values.ndim != 1:
+            raise ValueError(f"values must be one row of float64, got {self.values.dtype}.")
+        if not np.isfinite(self.values).all():
+            raise ValueError("values must be finite, got NaN or infinity.")
+        if self.lengths.dtype != np.int64 or self.lengths.ndim != 1:
+            raise ValueError(f"lengths must be one row of int64, got {self.lengths.dtype}.")
+        least = min(self.width, PERIOD)
+        if not 0 < self.width <= LARGEST_WIDTH:
+            raise ValueError(f"width must be between 1 and {LARGEST_WIDTH}, got {self.width}.")
+        if len(self.lengths) and not least <= self.lengths.min() <= self.lengths.max() <= self.width:
+            raise ValueError(f"lengths must be between {least} and the width, {self.width}.")
+        if self.lengths.sum() != len(self.values):
+            raise ValueError(
+                f"values must hold the {self.lengths.sum()} numbers that lengths add up to, got "
+                f"{len(self.values)}."
+            )
 
     @classmethod
     def concatenate(cls, parts: Sequence[TrimmedRows]) -> TrimmedRows:
