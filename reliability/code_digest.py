@@ -98,7 +98,9 @@ class _Walk:
     def _class(self, kind: type) -> None:
         if not _is_own(kind.__module__):
             return
-        self.tokens.add(f"class {kind.__qualname__} {[base.__qualname__ for base in kind.__bases__]}")
+        self.tokens.add(
+            f"class {kind.__qualname__} {[base.__qualname__ for base in kind.__bases__]}"
+        )
         if issubclass(kind, Enum):
             self._each(kind.__qualname__, [(member.name, repr(member.value)) for member in kind])
             return
@@ -166,7 +168,9 @@ def _in_order(constant: Any) -> Any:
     """Return a constant of compiled code with its sets sorted, whose order is random."""
     if isinstance(constant, frozenset):
         return sorted(map(repr, constant))
-    return [_in_order(part) for part in constant] if isinstance(constant, tuple | list) else constant
+    return (
+        [_in_order(part) for part in constant] if isinstance(constant, tuple | list) else constant
+    )
 
 
 def _content_of(cell: Any) -> Any:

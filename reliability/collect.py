@@ -15,8 +15,8 @@ from reliability.plan_execution import (
     FAILED,
     LABELS,
     UNSOLVED,
-    Planner,
     PlanFailedError,
+    Planner,
     PlanTask,
     plan_seeds,
     tell_failure,
@@ -25,7 +25,6 @@ from reliability.scenes import SceneArgument, SceneFamily
 from reliability.store import Job, ResumableStore, run_jobs
 from reliability.summary import Summary
 from reliability.transitions import Transitions, join
-from systems.system import System
 from systems.validation import RandomState, as_seed, check_count
 
 _KIND = "transitions of executed plans, one plan in each file"
@@ -162,22 +161,23 @@ def _run(
     tasks: list[PlanTask], store: ResumableStore | None, n_jobs: int | None, verbose: int
 ) -> list[Item]:
     jobs = [Job(f"plan-{task.plan:07d}", task, store) for task in tasks]
-    if tasks[0].on_error == "raise":
-        _discard_failed(jobs)
     try:
-        return run_jobs(jobs, n_jobs=n_jobs, verbose=verbose, unit="plan")
+        items = run_jobs(jobs, n_jobs=n_jobs, verbose=verbose, unit="plan")
+        failed = [job for job, item in zip(jobs, items, strict=True) if _has_failed(item)]
+        if failed and store is not None and tasks[0].on_error == "raise":
+            # An earlier run left these out.
+            for job in failed:
+                store.discard(job.name)
+            items = run_jobs(jobs, n_jobs=n_jobs, verbose=verbose, unit="plan")
     except PlanFailedError as error:
         if error.__cause__ is not error.args[1]:  # the worker's traceback, as text
             error.add_note(str(error.__cause__))
         raise error from error.args[1]
+    return items
 
 
-def _discard_failed(jobs: list[Job]) -> None:
-    """Have the plans made again that an earlier run left out because they failed."""
-    for job in jobs:
-        item = job.finished()
-        if item is not None and job.store is not None and item.facts["outcome"] == FAILED:
-            job.store.discard(job.name)
+def _has_failed(item: Item) -> bool:
+    return bool(item.facts["outcome"] == FAILED)
 
 
 def _joined(items: list[Item], verbose: int) -> Transitions:
@@ -188,7 +188,7 @@ def _joined(items: list[Item], verbose: int) -> Transitions:
             "diverged.",
             stacklevel=3,
         )
-    failures = [item.facts["failure"] for item in items if item.facts["outcome"] == FAILED]
+    failures = [item.facts["failure"] for item in items if _has_failed(item)]
     if failures:
         told = "\n".join(map(tell_failure, failures[:_MOST_TOLD]))
         more = len(failures) - _MOST_TOLD

@@ -79,7 +79,9 @@ class _Walk:
         if isinstance(thing, Enum):
             return _hash("enum", type(thing).__qualname__, thing.name)
         if isinstance(thing, _CODE):
-            return _hash("code", thing.__qualname__ if hasattr(thing, "__qualname__") else repr(thing))
+            return _hash(
+                "code", thing.__qualname__ if hasattr(thing, "__qualname__") else repr(thing)
+            )
         if id(thing) not in self._seen:
             self._seen[id(thing)] = thing, b"cycle"
             self._seen[id(thing)] = thing, self._parts(thing)

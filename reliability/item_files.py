@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import uuid
 from dataclasses import dataclass, field
@@ -144,7 +145,7 @@ def _move_unless_there(partial: Path, target: Path) -> None:
 def _arrays(layouts: list[Any], payload: bytes) -> dict[str, NDArray[Any]]:
     arrays, begin = {}, 0
     for name, kind, shape in layouts:
-        count = int(np.prod(shape, dtype=np.int64))
+        count = math.prod(shape)
         # A copy can be written to, and is aligned.
         array = np.frombuffer(payload, np.dtype(kind), count, begin).reshape(shape).copy()
         arrays[name] = array

@@ -149,9 +149,7 @@ class PlanTask:
 
     def _of_execution(self, system: System, plan: Any, executed: Array) -> Transitions:
         """Label what g predicts from the executed states."""
-        found = label_executed_transitions(
-            executed, plan.commands, system.propagate, system.close
-        )
+        found = label_executed_transitions(executed, plan.commands, system.propagate, system.close)
         commands = plan.commands[found.step]
         return self._rows(found.reduced, commands, found.next_reduced, found.y, found.step, True)
 

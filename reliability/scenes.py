@@ -40,7 +40,9 @@ class SceneFamily:
         elif isinstance(system, Sequence) and not isinstance(system, str):
             self._systems = system
             if not len(system) or not all(isinstance(one, System) for one in system):
-                raise ValueError("system must be a sequence of at least one System and nothing else.")
+                raise ValueError(
+                    "system must be a sequence of at least one System and nothing else."
+                )
         elif not callable(system):
             raise ValueError(
                 "system must be a System, a sequence of Systems or a callable that returns a "
@@ -75,7 +77,9 @@ class SceneFamily:
             return source
         made = source(scene)
         if not isinstance(made, System):
-            raise ValueError(f"system must return a System for the random_state {scene}, got {made!r}.")
+            raise ValueError(
+                f"system must return a System for the random_state {scene}, got {made!r}."
+            )
         return made
 
     def check_ids(self, scenes: NDArray[np.int64]) -> None:

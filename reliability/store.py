@@ -184,7 +184,9 @@ def run_jobs(
         joblib.delayed(_run)(i, job.name, job.compute, job.store and job.store.files)
         for i, job in ((i, jobs[i]) for i in missing)
     )
-    with tqdm(total=len(jobs), initial=len(jobs) - len(missing), unit=unit, disable=not verbose) as bar:
+    with tqdm(
+        total=len(jobs), initial=len(jobs) - len(missing), unit=unit, disable=not verbose
+    ) as bar:
         for i, made in _in_parallel(tasks, n_jobs):
             items[i] = jobs[i].finished() if made is None else made
             bar.update()
@@ -225,7 +227,8 @@ def differences(then: Any, now: Any, name: str = "") -> list[str]:
 
     Parameters
     ----------
-    then, now : nested dicts and lists of numbers and strings
+    then, now : object
+        Nested dicts and lists of numbers and strings.
     name : str, default=""
         What both describe.
 
@@ -234,16 +237,17 @@ def differences(then: Any, now: Any, name: str = "") -> list[str]:
     sentences : list of str
         One for each entry that differs, as in "planner.k: 1.0 then, 2.0 now".
     """
+    pairs: list[tuple[Any, Any, Any]]
     if isinstance(then, dict) and isinstance(now, dict):
-        keys: list[Any] = [*then, *(key for key in now if key not in then)]
+        keys = [*then, *(key for key in now if key not in then)]
         pairs = [(key, then.get(key, "nothing"), now.get(key, "nothing")) for key in keys]
     elif isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
-        pairs = [(i, *both) for i, both in enumerate(zip(then, now, strict=True))]
+        pairs = [(i, one, other) for i, (one, other) in enumerate(zip(then, now, strict=True))]
     else:
         same = canonical_json(then) == canonical_json(now)
         return [] if same else [f"{name}: {_shown(then)} then, {_shown(now)} now"]
     prefix = "" if name in ("", "description") else f"{name}."
-    return [text for key, *both in pairs for text in differences(*both, f"{prefix}{key}")]
+    return [text for key, one, other in pairs for text in differences(one, other, f"{prefix}{key}")]
 
 
 def _read_manifest(file: Path) -> dict[str, Any]:

@@ -12,14 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from reliability.archive import read_arrays, write_arrays
 from reliability.labels import RELIABLE, UNRELIABLE
 from reliability.scenes import SceneArgument, SceneFamily
-from reliability.trimmed_rows import TrimmedRows, as_bits
+from reliability.trimmed_rows import ARRAYS, TrimmedRows, as_bits
 from systems.system import System
 from systems.validation import as_finite_array, check_count
 
 FORMAT_VERSION = 3
 
 _COLUMNS = ("command", "y", "plan", "step", "scene", "executed")
-_STATES = ("values", "lengths", "width")
 _DESCRIBED_AT_ONCE = 2**15
 
 
@@ -114,19 +113,22 @@ class Transitions:
 
     @property
     def reduced(self) -> NDArray[np.float64]:
-        """The states b of each transition, shape (n, reduced_dim)."""
+        """The states b of each transition, shape (n, reduced_dim).
+
+        With scenes of different ``reduced_dim``, the largest; the last point of the others is
+        repeated. Select the rows of one scene to give them to its system.
+        """
         return self._states.unpack(self._first)
 
     @property
     def next_reduced(self) -> NDArray[np.float64]:
-        """The states b' of each transition, shape (n, reduced_dim)."""
+        """The states b' of each transition, shape (n, reduced_dim), like ``reduced``."""
         return self._states.unpack(self._first + 1)
 
     @property
     def nbytes(self) -> int:
         """Bytes that the transitions take up in memory."""
-        stored = (self._states.values, self._states.lengths, self._first)
-        return sum(array.nbytes for array in (*stored, *self._columns().values()))
+        return sum(array.nbytes for array in self.to_arrays().values())
 
     def __len__(self) -> int:
         return len(self._first)
@@ -146,13 +148,15 @@ class Transitions:
         return self._of_states(states, _first_states(follows_on), columns)
 
     def __repr__(self) -> str:
+        dims = np.unique(np.append(self._states.widths, self._states.width)).tolist()
         if not len(self):
-            return f"<Transitions: none, reduced_dim {self._states.width}>"
+            return f"<Transitions: none, reduced_dim {dims[0]}>"
+        dim = str(dims[0]) if len(dims) == 1 else f"{dims[0]} to {dims[-1]}"
         n_plans, n_scenes = len(np.unique(self.plan)), len(np.unique(self.scene))
         return (
             f"<Transitions: {_counted(len(self), 'transition')} of {_counted(n_plans, 'plan')} in "
             f"{_counted(n_scenes, 'scene')}, {np.mean(self.y == UNRELIABLE):.1%} Unreliable, "
-            f"reduced_dim {self._states.width}, command_dim {self.command.shape[1]}>"
+            f"reduced_dim {dim}, command_dim {self.command.shape[1]}>"
         )
 
     def trim_unreliable_tail(self, n_after: int) -> Transitions:
@@ -222,13 +226,11 @@ class Transitions:
         family = SceneFamily(system)
         scenes = np.unique(self.scene) if len(self) else np.zeros(1, dtype=np.int64)
         family.check_ids(scenes)
-        X = None
+        none = self._described(family.system(int(scenes[0])), np.arange(0))
+        X = np.empty((len(self), *none.shape[1:]), dtype=none.dtype)
         for scene in scenes:
             described = family.system(int(scene))
             rows = np.flatnonzero(self.scene == scene)
-            if X is None:
-                none = self._described(described, rows[:0])
-                X = np.empty((len(self), *none.shape[1:]), dtype=none.dtype)
             # A million grids fit into memory once, not twice: parts are filled in, not joined.
             for begin in range(0, len(rows), _DESCRIBED_AT_ONCE):
                 chunk = rows[begin : begin + _DESCRIBED_AT_ONCE]
@@ -258,8 +260,7 @@ class Transitions:
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Return the arrays that a file of these transitions holds."""
-        states = {name: np.asarray(getattr(self._states, name)) for name in _STATES}
-        return {**self._columns(), **states, "first": self._first}
+        return {**self._columns(), **self._states.to_arrays(), "first": self._first}
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> Transitions:
@@ -270,12 +271,9 @@ class Transitions:
         ValueError
             If the arrays don't belong together.
         """
-        if arrays["width"].shape != () or arrays["width"].dtype.kind not in "iu":
-            raise ValueError(f"width must be one integer, got {arrays['width']!r:.50}.")
-        states = TrimmedRows(arrays["values"], arrays["lengths"], int(arrays["width"]))
-        states.check()
+        states = TrimmedRows.from_arrays(arrays)
         first = _integers(arrays["first"], "first", len(arrays["y"]))
-        if len(first) and not (0 <= first.min() and first.max() < len(states) - 1):
+        if len(first) and not (first.min() >= 0 and first.max() < len(states) - 1):
             raise ValueError(f"first must number states of {len(states)} that another follows.")
         columns = {name: arrays[name] for name in _COLUMNS}
         columns["command"] = as_finite_array(columns["command"], "command", (len(first), None))
@@ -295,7 +293,7 @@ class Transitions:
             If the file is no such file, is truncated or damaged, has another format version, or
             holds arrays that don't belong together.
         """
-        names = {"first", *_COLUMNS, *_STATES}
+        names = {"first", *_COLUMNS, *ARRAYS}
         arrays = read_arrays(path, names, format_version=FORMAT_VERSION, kind="transitions")
         try:
             return cls.from_arrays(arrays)
@@ -339,7 +337,7 @@ def _integers(values: Any, name: str, n: int) -> NDArray[np.int64]:
 
 
 def _ids_apart(ids: Sequence[NDArray[np.int64]]) -> list[NDArray[np.int64]]:
-    """Number the ids of a part anew, in order, if an earlier part has one of them."""
+    """Return the ids of each part, numbered anew in order if an earlier part has one of them."""
     apart: list[NDArray[np.int64]] = []
     taken: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
     for part in ids:
