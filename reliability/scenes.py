@@ -10,7 +10,11 @@ from numpy.typing import NDArray
 
 from reliability.code_digest import code_digest
 from reliability.identity import describe
+from reliability.item_files import canonical_json, digest_of
 from systems.system import System
+
+# Of more systems a manifest holds a digest each: those of thousands of scenes fill megabytes.
+_MOST_IN_WORDS = 50
 
 SceneArgument = System | Sequence[System] | Callable[[int], System]
 
@@ -102,6 +106,8 @@ class SceneFamily:
         if self._systems is None:
             return {"system": describe(self._given)}
         described = [describe(one) for one in self._systems]
+        if len(described) > _MOST_IN_WORDS:
+            described = [digest_of(canonical_json(one)) for one in described]
         kinds = dict.fromkeys(type(one) for one in self._systems)
         code = {kind.__qualname__: code_digest(kind) for kind in kinds}
         return {"system": described[0] if self.is_single else described, "code": code}
