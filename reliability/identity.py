@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
 from enum import Enum
 from pathlib import PurePath
@@ -10,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from reliability.code_digest import code_digest
-from reliability.content_digest import content_digest, pickled_state
+from reliability.pickled_content import content_digest, pickled_state
+from reliability.reachable_code import code_digest
 
 # Parameters of estimators and planners on which what they answer does not depend.
 _IRRELEVANT = frozenset({"random_state", "n_jobs", "verbose"})
@@ -65,6 +66,8 @@ def describe(thing: Any) -> Any:
         return str(thing)
     if isinstance(thing, Enum):
         return thing.name
+    if isinstance(thing, functools.partial):
+        return {"partial": describe(thing.func), "of": describe([thing.args, thing.keywords])}
     if isinstance(thing, type) or inspect.isroutine(thing):
         return {"name": thing.__qualname__, "code": code_digest(thing)}
     return _described_object(thing)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reliability.code_digest import code_digest
 from reliability.identity import describe
 from reliability.item_files import canonical_json, digest_of
+from reliability.reachable_code import code_digest
 from systems.system import System
 
 # Of more systems a manifest holds a digest each: those of thousands of scenes fill megabytes.
@@ -104,7 +104,7 @@ class SceneFamily:
     def describe(self) -> Any:
         """Describe the family for a manifest."""
         if self._systems is None:
-            return {"system": describe(self._given)}
+            return {"system": describe(self._given), "code": code_digest(type(self._given))}
         described = [describe(one) for one in self._systems]
         if len(described) > _MOST_IN_WORDS:
             described = [digest_of(canonical_json(one)) for one in described]

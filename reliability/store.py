@@ -93,6 +93,20 @@ class ResumableStore:
         self.files = ItemFiles(self.folder, digest_of(canonical_json(found)))
         self._remove_abandoned()
 
+    @classmethod
+    def at(cls, folder: str | os.PathLike[str]) -> ResumableStore:
+        """Open a folder as its manifest describes it, to read what is there.
+
+        Raises
+        ------
+        FileNotFoundError
+            If there is no manifest.
+        StoreError
+            If the manifest can't be read.
+        """
+        found = _read_manifest(Path(folder) / _MANIFEST)
+        return cls(folder, found["kind"], found["description"])
+
     def names(self) -> list[str]:
         """Return the names of the finished items, sorted."""
         return sorted(file.name.removesuffix(SUFFIX) for file in self.folder.glob(f"*{SUFFIX}"))

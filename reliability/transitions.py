@@ -226,7 +226,8 @@ class Transitions:
         family = SceneFamily(system)
         scenes = np.unique(self.scene) if len(self) else np.zeros(1, dtype=np.int64)
         family.check_ids(scenes)
-        none = self._described(family.system(int(scenes[0])), np.arange(0))
+        first = family.system(int(scenes[0]))
+        none = first.features(*np.empty((2, 0, first.reduced_dim)))
         X = np.empty((len(self), *none.shape[1:]), dtype=none.dtype)
         for scene in scenes:
             described = family.system(int(scene))

@@ -80,13 +80,15 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _column(name: str, options: argparse.Namespace) -> Column:
+    if name in UNCLASSIFIED:
+        return Column(None, UNCLASSIFIED[name], options.engine, time_limit=options.time_limit)
     return Column(
-        model=COLUMNS.get(name, Path(name)),
-        features=UNCLASSIFIED.get(name, options.features),
-        engine=options.engine,
-        k=options.k,
-        accuracy=options.accuracy,
-        time_limit=options.time_limit,
+        COLUMNS.get(name, Path(name)),
+        options.features,
+        options.engine,
+        options.time_limit,
+        options.k,
+        options.accuracy,
     )
 
 

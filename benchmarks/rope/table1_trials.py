@@ -29,16 +29,16 @@ class Column:
         Of the rope, unless the model says that it was trained on others.
     engine : str
         Of the rope.
-    k, accuracy, time_limit : float
-        Of the planner.
+    time_limit, k, accuracy : float
+        Of the planner; without a model the last two don't matter.
     """
 
     model: Path | None
     features: str
     engine: str
-    k: float
-    accuracy: float | None
     time_limit: float
+    k: float = 10.0
+    accuracy: float | None = None
 
     def rope(self, scene: str) -> Rope:
         """Return the rope in one of the paper's scenes."""

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from reliability.content_digest import content_digest
+from reliability.pickled_content import content_digest
 
 _LIBRARY = frozenset({"planners", "reliability", "systems"})
 _INSTALLED = frozenset({"site-packages", "dist-packages"})

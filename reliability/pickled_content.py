@@ -98,6 +98,8 @@ class _Walk:
             return _hash("sequence", *(self.digest(value) for value in thing))
         if isinstance(thing, set | frozenset):
             return _hash("set", *sorted(self.digest(value) for value in thing))
+        if hasattr(thing, "get_tree_stats"):  # scikit-learn's trees of neighbours count their calls
+            return _hash("neighbours", *map(self.digest, map(np.asarray, thing.get_arrays())))
         return self._object(thing)
 
     def _array(self, array: np.ndarray) -> bytes:
