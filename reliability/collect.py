@@ -18,7 +18,6 @@ from reliability.plan_execution import (
     PlanFailedError,
     Planner,
     PlanTask,
-    plan_seeds,
     tell_failure,
 )
 from reliability.scenes import SceneArgument, SceneFamily
@@ -153,7 +152,7 @@ def _open_store(
 
 def _source(family: SceneFamily, seed: int, plan: int) -> tuple[Any, int]:
     """Return what a plan's task makes its system of, and the scene's id."""
-    scene = family.id_of_plan(plan, plan_seeds(seed, plan)[2])
+    scene = family.id_of_plan(plan, seed)
     return family.source(scene), scene
 
 

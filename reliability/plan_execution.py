@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from reliability.item_files import Item
 from reliability.labels import label_executed_transitions, label_transitions
-from reliability.scenes import SceneFamily
+from reliability.scenes import SceneFamily, plan_seeds
 from reliability.transitions import Transitions, join
 from systems.errors import SimulationDivergedError
 from systems.system import Array, Problem, System
@@ -61,11 +61,6 @@ def tell_failure(facts: dict[str, Any]) -> str:
         f"Plan {facts['plan']} (scene {facts['scene']}, random_state of the planner "
         f"{facts['random_state']}) failed with {facts['error']}. Its problem: {facts['problem']}"
     )
-
-
-def plan_seeds(seed: int, plan: int) -> list[np.random.SeedSequence]:
-    """Return the seeds of a plan's problem, of its planner and of its scene."""
-    return np.random.SeedSequence(seed, spawn_key=(plan,)).spawn(3)
 
 
 @dataclass(frozen=True)

@@ -58,15 +58,16 @@ class SceneFamily:
         """Whether there is only one system."""
         return isinstance(self._given, System)
 
-    def id_of_plan(self, plan: int, seeds: np.random.SeedSequence) -> int:
-        """Return the id of the scene that a plan is made in.
+    def id_of_plan(self, plan: int, seed: int) -> int:
+        """Return the id of the scene that a plan of a collection with this seed is made in.
 
         The systems of a sequence take turns. To a callable each plan's scene is a new one.
         """
         if self._systems is not None:
             return plan % len(self._systems)
+        of_scene = plan_seeds(seed, plan)[2]
         # Ids are stored as int64.
-        return int(seeds.generate_state(1, np.uint64)[0] >> np.uint64(1))
+        return int(of_scene.generate_state(1, np.uint64)[0] >> np.uint64(1))
 
     def source(self, scene: int) -> System | Callable[[int], System]:
         """Return the system of a scene, or the callable that makes it of the scene's id."""
@@ -123,3 +124,8 @@ class SceneFamily:
             return True
         alike = [one for one in self._systems if type(one) is type(system)]
         return bool(alike) and describe(system) in [describe(one) for one in alike]
+
+
+def plan_seeds(seed: int, plan: int) -> list[np.random.SeedSequence]:
+    """Return the seeds of a plan's problem, of its planner and of its scene."""
+    return np.random.SeedSequence(seed, spawn_key=(plan,)).spawn(3)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from reliability.archive import read_arrays, write_arrays
 from reliability.labels import RELIABLE, UNRELIABLE
 from reliability.scenes import SceneArgument, SceneFamily
+from reliability.transition_columns import as_integers, checked_columns, ids_apart
 from reliability.trimmed_rows import ARRAYS, TrimmedRows, as_bits
 from systems.system import System
 from systems.validation import as_finite_array, check_count
@@ -83,7 +84,7 @@ class Transitions:
             "scene": none if scene is None else scene,
             "executed": none.astype(np.bool_) if executed is None else executed,
         }
-        self._set_columns(_checked_columns(columns, n))
+        self._set_columns(checked_columns(columns, n))
         follows_on = np.zeros(n, dtype=np.bool_)
         follows_on[:-1] = (as_bits(after[:-1]) == as_bits(before[1:])).all(axis=1)
         both = np.stack([before, after], axis=1)
@@ -202,7 +203,7 @@ class Transitions:
         transitions : Transitions
         """
         joined = join(parts)
-        joined.plan = np.concatenate(_ids_apart([part.plan for part in parts]))
+        joined.plan = np.concatenate(ids_apart([part.plan for part in parts]))
         return joined
 
     def features(self, system: SceneArgument) -> NDArray[Any]:
@@ -273,12 +274,12 @@ class Transitions:
             If the arrays don't belong together.
         """
         states = TrimmedRows.from_arrays(arrays)
-        first = _integers(arrays["first"], "first", len(arrays["y"]))
+        first = as_integers(arrays["first"], "first", len(arrays["y"]))
         if len(first) and not (first.min() >= 0 and first.max() < len(states) - 1):
             raise ValueError(f"first must number states of {len(states)} that another follows.")
         columns = {name: arrays[name] for name in _COLUMNS}
         columns["command"] = as_finite_array(columns["command"], "command", (len(first), None))
-        return cls._of_states(states, first, _checked_columns(columns, len(first)))
+        return cls._of_states(states, first, checked_columns(columns, len(first)))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file; whatever stood there is replaced only when all is written."""
@@ -311,43 +312,6 @@ def join(parts: Sequence[Transitions]) -> Transitions:
     first = [part._first + n for part, n in zip(parts, n_before[:-1], strict=True)]
     columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS}
     return Transitions._of_states(states, np.concatenate(first), columns)
-
-
-def _checked_columns(columns: dict[str, Any], n: int) -> dict[str, NDArray[Any]]:
-    checked = {name: _integers(columns[name], name, n) for name in ("y", "plan", "step", "scene")}
-    wrong = checked["y"][(checked["y"] != RELIABLE) & (checked["y"] != UNRELIABLE)]
-    if len(wrong):
-        raise ValueError(
-            f"y must hold {RELIABLE} for Reliable and {UNRELIABLE} for Unreliable, got {wrong[0]}."
-        )
-    executed = np.asarray(columns["executed"])
-    if executed.dtype != np.bool_ or executed.shape != (n,):
-        raise ValueError(
-            f"executed must hold {n} bools, got {executed.dtype} of shape {executed.shape}."
-        )
-    return {**checked, "command": columns["command"], "executed": executed}
-
-
-def _integers(values: Any, name: str, n: int) -> NDArray[np.int64]:
-    array = np.asarray(values)
-    if array.shape != (n,):
-        raise ValueError(f"{name} must have the shape ({n},), got {array.shape}.")
-    if array.dtype.kind not in "biu" and len(array):
-        raise ValueError(f"{name} must hold integers, got {array.dtype}, such as {array[0]!r}.")
-    return array.astype(np.int64, copy=False)
-
-
-def _ids_apart(ids: Sequence[NDArray[np.int64]]) -> list[NDArray[np.int64]]:
-    """Return the ids of each part, numbered anew in order if an earlier part has one of them."""
-    apart: list[NDArray[np.int64]] = []
-    taken: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
-    for part in ids:
-        own, number = np.unique(part, return_inverse=True)
-        if np.isin(own, taken).any():
-            own = taken.max() + 1 + np.arange(len(own))
-        taken = np.union1d(taken, own)
-        apart.append(own[number])
-    return apart
 
 
 def _counted(n: int, noun: str) -> str:
