@@ -2,27 +2,43 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
+import math
 import os
 import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from reliability.item_files import put
+
 _VERSION = "format_version"
+_DIGEST = "digest"
 
 
 def write_arrays(
     path: str | os.PathLike[str], arrays: dict[str, Any], *, format_version: int
 ) -> None:
-    """Write one npz file; whatever stood there is replaced only when all is written."""
-    target = Path(path)
-    partial = target.with_name(target.name + ".partial")
-    with partial.open("wb") as file:
-        named: dict[str, Any] = {_VERSION: np.array(format_version)} | arrays
-        np.savez(file, **named)
-    os.replace(partial, target)
+    """Write one npz file; whatever stood there is replaced only when all is written.
+
+    Raises
+    ------
+    ValueError
+        If an array holds Python objects, which could not be read back.
+    """
+    named = {name: np.asarray(array) for name, array in arrays.items()}
+    named[_VERSION] = np.array(format_version)
+    for name, array in named.items():
+        if array.dtype.hasobject:
+            raise ValueError(f"{name} must be an array of numbers or strings, got objects.")
+    named[_DIGEST] = np.array(_digest_of_arrays(named))
+    content = io.BytesIO()
+    np.savez(content, **named)  # type: ignore[arg-type]
+    put(Path(path), content.getbuffer())
 
 
 def read_arrays(
@@ -43,24 +59,69 @@ def read_arrays(
     Raises
     ------
     ValueError
-        If the file is no such file, is truncated, or has another format version.
+        If the file is no such file, is truncated or damaged, or has another format version.
     FileNotFoundError
         If there is no such file.
     """
     try:
-        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-            found = int(arrays.pop(_VERSION))
+        arrays = _read_all(Path(path))
+        found = int(arrays[_VERSION])
     except FileNotFoundError:
         raise
-    except (zipfile.BadZipFile, KeyError, EOFError, OSError, AttributeError, ValueError) as error:
+    except (
+        zipfile.BadZipFile,
+        KeyError,
+        EOFError,
+        OSError,
+        AttributeError,
+        NotImplementedError,
+        TypeError,
+        ValueError,
+    ) as error:
         raise ValueError(f"{path} is not a whole file of {kind} ({error}).") from error
     if found != format_version:
         raise ValueError(
             f"{path} has the format version {found} and this library reads {format_version}; "
             "make it again, or load it with the version of the library that wrote it."
         )
+    digest = str(arrays.pop(_DIGEST, "none"))
+    if digest != _digest_of_arrays(arrays):
+        raise ValueError(f"{path} was changed after it had been written: its digest is another.")
+    del arrays[_VERSION]
     if not required <= arrays.keys():
         missing = sorted(required - arrays.keys())
         raise ValueError(f"{path} is not a whole file of {kind} (it lacks {missing}).")
     return arrays
+
+
+def _read_all(path: Path) -> dict[str, NDArray[Any]]:
+    size = path.stat().st_size
+    with zipfile.ZipFile(path) as archive:
+        entries = archive.infolist()
+        # Nothing is allocated for what the file only claims to hold.
+        if sum(entry.file_size for entry in entries) > size:
+            raise ValueError(f"its arrays would be larger than the file's {size} bytes")
+        return {
+            entry.filename.removesuffix(".npy"): _read_array(archive.read(entry), entry.filename)
+            for entry in entries
+        }
+
+
+def _read_array(content: bytes, name: str) -> NDArray[Any]:
+    stream = io.BytesIO(content)
+    version = npy.read_magic(stream)
+    read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+    shape, _, dtype = read_header(stream)
+    n_bytes = math.prod(shape) * dtype.itemsize
+    if n_bytes != len(content) - stream.tell():
+        raise ValueError(f"{name} claims to hold {n_bytes} bytes and does not")
+    stream.seek(0)
+    return npy.read_array(stream, allow_pickle=False)
+
+
+def _digest_of_arrays(arrays: dict[str, NDArray[Any]]) -> str:
+    total = hashlib.blake2b(digest_size=16)
+    for name, array in sorted(arrays.items()):
+        total.update(f"{name} {array.dtype.str} {array.shape} ".encode())
+        total.update(np.ascontiguousarray(array).tobytes())
+    return total.hexdigest()

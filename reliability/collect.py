@@ -3,53 +3,41 @@
 from __future__ import annotations
 
 import copy
-import json
 import os
 import warnings
-from collections.abc import Iterable
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Protocol
+from collections import Counter
+from typing import Any
 
-import joblib
-import numpy as np
-from numpy.typing import NDArray
-from tqdm.auto import tqdm
-
-from reliability.labels import label_transitions
+from reliability.identity import describe_planner
+from reliability.item_files import Item
+from reliability.plan_execution import (
+    DIVERGED,
+    FAILED,
+    LABELS,
+    UNSOLVED,
+    PlanFailedError,
+    Planner,
+    PlanTask,
+    tell_failure,
+)
+from reliability.scenes import SceneArgument, SceneFamily
+from reliability.store import Job, ResumableStore, run_jobs
 from reliability.summary import Summary
-from reliability.transitions import Transitions
-from systems.errors import SimulationDivergedError
-from systems.system import System
+from reliability.transitions import Transitions, join
 from systems.validation import RandomState, as_seed, check_count
 
-FORMAT_VERSION = 1
-PLANS_PER_SHARD = 50
-
-
-class Planner(Protocol):
-    """What collection asks of a planner: those of :mod:`planners` have it."""
-
-    random_state: Any
-
-    def plan(self, start_reduced: NDArray[np.float64], goal: NDArray[np.float64]) -> Any:
-        """Return a result with ``success``, ``reduced`` and ``commands``."""
-
-
-@dataclass(frozen=True)
-class _Shard:
-    """What a run of consecutive plans gave; None where no plan gave a transition."""
-
-    transitions: Transitions | None
-    n_unsolved: int
-    n_diverged: int
+_KIND = "transitions of executed plans, one plan in each file"
+_ON_ERROR = ("raise", "skip")
+_MOST_TOLD = 10
 
 
 def collect_transitions(
-    system: System,
+    system: SceneArgument,
     planner: Planner,
     n_plans: int,
     *,
+    labels: str = "plan",
+    on_error: str = "raise",
     n_jobs: int | None = None,
     random_state: RandomState = None,
     path: str | os.PathLike[str] | None = None,
@@ -58,25 +46,37 @@ def collect_transitions(
     """Plan, execute and label, many times over.
 
     Each plan has a problem and a planner seed of its own, which follow from ``random_state`` and
-    the plan's number alone. Transitions that the execution never came to are left out; plans
-    that the planner doesn't solve or on which the simulator diverges are dropped, the latter
-    with a warning.
+    the plan's number alone. Plans that the planner doesn't solve are left out, and so are, with a
+    warning, plans on which the simulator diverges.
 
     Parameters
     ----------
-    system : System
+    system : System, sequence of Systems, or callable ``random_state -> System``
+        Where plans are made: in one system; in those of a sequence, which take turns; or each in
+        a new one, which the callable makes of an integer and must make again of the same.
     planner : BiasedRRT, BiasedRRTConnect or alike
-        Without an estimator, for data as in the paper. Its own ``random_state`` is not used.
+        A template: for each plan, a copy is given that plan's system and a seed. Without an
+        estimator for data as in the paper.
     n_plans : int
+    labels : {"plan", "executed", "both"}, default="plan"
+        "plan" labels the plan's transitions by Eq. 3 (:func:`label_transitions`); those that the
+        execution never came to are left out. "executed" labels each executed command from where
+        the true system was when it was given it (:func:`label_executed_transitions`). "both"
+        has both for each plan; ``Transitions.executed`` tells them apart.
+    on_error : {"raise", "skip"}, default="raise"
+        What to do if planning or executing raises an exception: end with the plan's number, seed
+        and problem, or leave the plan out, go on, and tell the same in a warning at the end.
     n_jobs : int, default=None
         Processes, or whatever the active joblib backend has; the data do not depend on it.
     random_state : int, Generator, RandomState, SeedSequence or None
     path : path-like, default=None
-        Folder to write to as plans are executed. A folder that an earlier, interrupted call with
-        the same arguments wrote is completed.
+        Folder in which each plan is kept as soon as it is executed. Call again with the same
+        arguments to go on after an interruption, or with a larger ``n_plans`` to have more;
+        with a smaller one, only its first plans are read. Several processes may work on one
+        folder.
     verbose : int, default=0
-        1 shows a progress bar and prints a :class:`reliability.summary.Summary`, which can also
-        be drawn.
+        1 shows a progress bar that counts plans, and prints a
+        :class:`reliability.summary.Summary`, which can also be drawn.
 
     Returns
     -------
@@ -86,168 +86,127 @@ def collect_transitions(
     Raises
     ------
     ValueError
-        If ``path`` holds data collected with other arguments, or no plan gave a transition.
+        If an argument is unfit, if ``planner`` has a system that is not one of ``system``, or if
+        no plan gave a transition.
+    StoreError
+        A ValueError. If ``path`` holds data that were collected with other arguments, by code of
+        the system that has changed, or files that are damaged, swapped or of another folder. The
+        message names the file, or what differs.
+    PlanFailedError
+        If a plan failed and ``on_error`` is "raise".
 
     References
     ----------
     McConachie et al. 2020, "Data Generation and Labeling".
     """
     check_count(n_plans, "n_plans")
-    store = None if path is None else _ShardFolder(Path(path))
-    seed = as_seed(random_state)
-    if store is not None:
-        seed = store.open(_describe(system, planner, int(n_plans), seed), random_state is None)
-    starts = range(0, n_plans, PLANS_PER_SHARD)
-    done = {} if store is None else store.read(len(starts))
-    missing = [i for i in range(len(starts)) if i not in done]
-    tasks = (
-        joblib.delayed(_collect_shard)(
-            system, planner, seed, i, range(starts[i], min(starts[i] + PLANS_PER_SHARD, n_plans))
+    _check_choice(labels, "labels", LABELS)
+    _check_choice(on_error, "on_error", _ON_ERROR)
+    family = SceneFamily(system)
+    _check_belongs(planner, family)
+    seed, store = as_seed(random_state), None
+    if path is not None:
+        store = _open_store(path, family, planner, labels, seed, adopt=random_state is None)
+        seed = store.description["random_state"]
+    template = copy.copy(planner)
+    template.system = template.random_state = None
+    tasks = [
+        PlanTask(*_source(family, seed, i), template, labels, on_error, seed, i)
+        for i in range(int(n_plans))
+    ]
+    items = _run(tasks, store, n_jobs, verbose)
+    return _joined(items, verbose)
+
+
+def _check_choice(value: Any, name: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise ValueError(f"{name} must be one of {', '.join(choices)}, got {value!r}.")
+
+
+def _check_belongs(planner: Planner, family: SceneFamily) -> None:
+    own = getattr(planner, "system", None)
+    if own is not None and not family.has(own):
+        raise ValueError(
+            f"planner has the system {own!r}, which is not one of those to collect from. Make it "
+            "with one of these, or with None: each plan's system is set."
         )
-        for i in missing
-    )
-    finished: Iterable[tuple[int, _Shard]] = joblib.Parallel(
-        n_jobs=n_jobs, return_as="generator_unordered"
-    )(tasks)
-    with tqdm(total=len(starts), initial=len(done), unit="shard", disable=not verbose) as bar:
-        for i, shard in finished:
-            if store is not None:
-                store.write(i, shard)
-            done[i] = shard
-            bar.update()
-    return _joined([done[i] for i in range(len(starts))], int(n_plans), verbose)
 
 
-def _describe(system: System, planner: Planner, n_plans: int, seed: int) -> dict[str, Any]:
-    def named(thing: Any) -> str:
-        return f"{type(thing).__module__}.{type(thing).__qualname__} {joblib.hash(thing)}"
-
-    unseeded = copy.copy(planner)
-    unseeded.random_state = None
-    return {
-        "format_version": FORMAT_VERSION,
-        "system": named(system),
-        "planner": named(unseeded),
-        "n_plans": n_plans,
+def _open_store(
+    path: str | os.PathLike[str],
+    family: SceneFamily,
+    planner: Planner,
+    labels: str,
+    seed: int,
+    *,
+    adopt: bool,
+) -> ResumableStore:
+    description = {
+        **family.describe(),
+        "planner": describe_planner(planner),
+        "labels": labels,
         "random_state": seed,
-        "plans_per_shard": PLANS_PER_SHARD,
     }
+    return ResumableStore(path, _KIND, description, ("random_state",) if adopt else ())
 
 
-def _collect_shard(
-    system: System, planner: Planner, seed: int, shard: int, plans: range
-) -> tuple[int, _Shard]:
-    collected, n_unsolved, n_diverged = [], 0, 0
-    for plan in plans:
-        try:
-            transitions = _execute_plan(system, planner, seed, plan)
-        except SimulationDivergedError:
-            n_diverged += 1
-            continue
-        if transitions is None:
-            n_unsolved += 1
-        else:
-            collected.append(transitions)
-    joined = Transitions.concatenate(collected) if collected else None
-    return shard, _Shard(joined, n_unsolved, n_diverged)
+def _source(family: SceneFamily, seed: int, plan: int) -> tuple[Any, int]:
+    """Return what a plan's task makes its system of, and the scene's id."""
+    scene = family.id_of_plan(plan, seed)
+    return family.source(scene), scene
 
 
-def _execute_plan(system: System, planner: Planner, seed: int, plan: int) -> Transitions | None:
-    problem_seed, planner_seed = np.random.SeedSequence(seed, spawn_key=(plan,)).spawn(2)
-    problem = system.sample_problem(problem_seed)
-    seeded = copy.copy(planner)
-    seeded.random_state = int(planner_seed.generate_state(1)[0])
-    result = seeded.plan(system.reduce(problem.start), problem.goal)
-    if not result.success:
-        return None
-    rollout = system.rollout(problem.start, result.commands)
-    executed = np.array([system.reduce(state) for state in rollout.states])
-    n_attempted = len(executed) - 1
-    return Transitions(
-        reduced=result.reduced[:n_attempted],
-        command=result.commands[:n_attempted],
-        next_reduced=result.reduced[1 : n_attempted + 1],
-        y=label_transitions(result.reduced, executed, system.close)[:n_attempted],
-        plan=np.full(n_attempted, plan),
-        step=np.arange(n_attempted),
-    )
+def _run(
+    tasks: list[PlanTask], store: ResumableStore | None, n_jobs: int | None, verbose: int
+) -> list[Item]:
+    jobs = [Job(f"plan-{task.plan:07d}", task, store) for task in tasks]
+    try:
+        items = run_jobs(jobs, n_jobs=n_jobs, verbose=verbose, unit="plan")
+        failed = [job for job, item in zip(jobs, items, strict=True) if _has_failed(item)]
+        if failed and store is not None and tasks[0].on_error == "raise":
+            # An earlier run left these out.
+            for job in failed:
+                store.discard(job.name)
+            items = run_jobs(jobs, n_jobs=n_jobs, verbose=verbose, unit="plan")
+    except PlanFailedError as error:
+        if error.__cause__ is not error.args[1]:  # the worker's traceback, as text
+            error.add_note(str(error.__cause__))
+        raise error from error.args[1]
+    return items
 
 
-def _joined(shards: list[_Shard], n_plans: int, verbose: int) -> Transitions:
-    n_unsolved = sum(shard.n_unsolved for shard in shards)
-    n_diverged = sum(shard.n_diverged for shard in shards)
-    if n_diverged:
+def _has_failed(item: Item) -> bool:
+    return bool(item.facts["outcome"] == FAILED)
+
+
+def _joined(items: list[Item], verbose: int) -> Transitions:
+    outcomes = Counter(item.facts["outcome"] for item in items)
+    if outcomes[DIVERGED]:
         warnings.warn(
-            f"{n_diverged} of {n_plans} plans were dropped because the simulator diverged.",
+            f"{outcomes[DIVERGED]} of {len(items)} plans were dropped because the simulator "
+            "diverged.",
             stacklevel=3,
         )
-    parts = [shard.transitions for shard in shards if shard.transitions is not None]
-    if not parts:
+    failures = [item.facts["failure"] for item in items if _has_failed(item)]
+    if failures:
+        told = "\n".join(map(tell_failure, failures[:_MOST_TOLD]))
+        more = len(failures) - _MOST_TOLD
+        warnings.warn(
+            f"{len(failures)} of {len(items)} plans failed and were left out.\n{told}"
+            + (f"\n… and {more} more." if more > 0 else ""),
+            stacklevel=3,
+        )
+    counts = (
+        f"{outcomes[UNSOLVED]} were not solved, {outcomes[DIVERGED]} diverged, {outcomes[FAILED]} "
+        "failed."
+    )
+    parts = [Transitions.from_arrays(item.arrays) for item in items if item.arrays]
+    if not sum(map(len, parts)):
         raise ValueError(
-            f"None of {n_plans} plans gave a transition: {n_unsolved} were not solved and "
-            f"{n_diverged} diverged. Give the planner more iterations, or look at the problems "
-            "that the system samples."
+            f"None of {len(items)} plans gave a transition: {counts} Give the planner more "
+            "iterations, or look at the problems that the system samples."
         )
-    transitions = Transitions.concatenate(parts)
+    transitions = join(parts)
     if verbose:
-        print(
-            f"{Summary.of(transitions)}\n"
-            f"{n_unsolved} of {n_plans:,} plans were not solved, {n_diverged} diverged."
-        )
+        print(f"{Summary.of(transitions)}\nOf {len(items):,} plans {counts}")
     return transitions
-
-
-class _ShardFolder:
-    """A folder with a manifest and one file per finished shard."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def open(self, description: dict[str, Any], any_seed: bool) -> int:
-        """Claim the folder for a description, or check it; return the seed to go on with."""
-        manifest = self._folder / "manifest.json"
-        if not manifest.exists():
-            self._folder.mkdir(parents=True, exist_ok=True)
-            partial = manifest.with_suffix(".partial")
-            partial.write_text(json.dumps(description, indent=2) + "\n")
-            os.replace(partial, manifest)
-            return int(description["random_state"])
-        found = json.loads(manifest.read_text())
-        if any_seed:
-            description = description | {"random_state": found.get("random_state")}
-        differing = [key for key in description if found.get(key) != description[key]]
-        if differing:
-            changes = "; ".join(
-                f"{key}: {found.get(key)} then, {description[key]} now" for key in differing
-            )
-            raise ValueError(
-                f"path {self._folder} holds data collected with other arguments ({changes}); "
-                "choose another path, or remove this one."
-            )
-        return int(found["random_state"])
-
-    def read(self, n_shards: int) -> dict[int, _Shard]:
-        """Read the finished shards."""
-        found = {}
-        for i in range(n_shards):
-            if self._counts(i).exists():
-                counts = json.loads(self._counts(i).read_text())
-                rows = Transitions.load(self._rows(i)) if self._rows(i).exists() else None
-                found[i] = _Shard(rows, **counts)
-        return found
-
-    def write(self, i: int, shard: _Shard) -> None:
-        """Write one shard; its counts come last and mark it as finished."""
-        if shard.transitions is not None:
-            shard.transitions.save(self._rows(i))
-        partial = self._counts(i).with_suffix(".partial")
-        partial.write_text(
-            json.dumps({"n_unsolved": shard.n_unsolved, "n_diverged": shard.n_diverged})
-        )
-        os.replace(partial, self._counts(i))
-
-    def _rows(self, i: int) -> Path:
-        return self._folder / f"shard-{i:05d}.npz"
-
-    def _counts(self, i: int) -> Path:
-        return self._folder / f"shard-{i:05d}.json"

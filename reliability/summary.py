@@ -24,13 +24,13 @@ class Summary:
     unreliable_share : float
         Of all transitions.
     divergence_onset_share : float
-        Share of the Unreliable transitions where prediction and execution part; in the others
-        they had parted before. NaN without any Unreliable one.
+        Share of the Unreliable transitions at which an execution diverges from its plan; the
+        others come after. NaN without any Unreliable one.
     reliable_plan_share : float
-        Plans all of whose transitions are Reliable.
+        Share of the plans whose transitions are all Reliable.
     transitions_per_plan : ndarray of int of shape (n_plans,)
     reliable_before_divergence : ndarray of int
-        Transitions that went well before the first mistake, of each plan that has one.
+        Number of transitions before the first Unreliable one, of each plan that has one.
     """
 
     n_transitions: int
@@ -68,18 +68,18 @@ class Summary:
         )
 
     def __str__(self) -> str:
-        """Tell the numbers in a few lines."""
+        """Return the numbers in a few lines."""
         low, middle, high = np.quantile(self.transitions_per_plan, (0.1, 0.5, 0.9))
         of_those = (
-            f"; {self.divergence_onset_share:.1%} of those are divergence onsets, the others follow"
-            " one"
+            f"; at {self.divergence_onset_share:.1%} of those an execution diverges from its plan, "
+            "the others come after"
             if self.unreliable_share
             else ""
         )
         return (
             f"{self.n_transitions:,} transitions of {self.n_plans:,} plans: "
             f"{self.transitions_per_plan.mean():.1f} a plan, {middle:.0f} in the median, "
-            f"{low:.0f} to {high:.0f} in four fifths.\n"
+            f"{low:.0f} to {high:.0f} from the 10th to the 90th percentile.\n"
             f"{self.unreliable_share:.1%} are Unreliable{of_those}.\n"
             f"{self.reliable_plan_share:.1%} of the plans are Reliable from start to end."
         )
@@ -105,7 +105,7 @@ class Summary:
         axes[0].hist(self.transitions_per_plan, bins, color="tab:blue")
         axes[0].set(xlabel="transitions per plan", ylabel="plans")
         axes[1].hist(self.reliable_before_divergence, bins, color="tab:red")
-        axes[1].set(xlabel="Reliable transitions before the first mistake")
+        axes[1].set(xlabel="transitions before the first Unreliable one")
         axes[1].set_title(
             f"{1 - self.reliable_plan_share:.0%} of plans have one; "
             f"{self.unreliable_share:.0%} of transitions are Unreliable",

@@ -7,63 +7,98 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from reliability.archive import read_arrays, write_arrays
 from reliability.labels import RELIABLE, UNRELIABLE
-from reliability.trimmed_rows import TrimmedRows, as_bits
+from reliability.scenes import SceneArgument, SceneFamily
+from reliability.transition_columns import as_integers, checked_columns, ids_apart
+from reliability.trimmed_rows import ARRAYS, TrimmedRows, as_bits
 from systems.system import System
-from systems.validation import check_count
+from systems.validation import as_finite_array, check_count
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 
-_OTHERS = ("command", "next_reduced", "y", "plan", "step")
-_COLUMNS = ("command", "y", "plan", "step")
-_STATES = ("values", "lengths", "width")
+_COLUMNS = ("command", "y", "plan", "step", "scene", "executed")
 _DESCRIBED_AT_ONCE = 2**15
 
 
 class Transitions:
     """Transitions of many executed plans, one per row.
 
-    Reduced states are stored once where a transition begins in the state that the one before
-    ended in, and without a band's repeats of its last point; ``reduced`` and ``next_reduced``
-    are made when asked for. Select rows first where there are many.
+    Reduced states are stored once where a transition begins in the state in which the previous
+    row ended, and a band that is shorter than its row is stored without the repeats of its last
+    point; ``reduced`` and ``next_reduced`` are put together when they are asked for. Where there
+    are many rows, select some first.
 
     Parameters
     ----------
     reduced : ndarray of shape (n, reduced_dim)
-        b, as planned.
+        b.
     command : ndarray of shape (n, command_dim)
         u.
     next_reduced : ndarray of shape (n, reduced_dim)
-        b' = g(b, u), as planned.
+        b' = g(b, u).
     y : ndarray of int of shape (n,)
-        RELIABLE or UNRELIABLE.
+        RELIABLE (1) or UNRELIABLE (0).
     plan : ndarray of int of shape (n,)
         Which plan the transition belongs to: the groups for splitting data.
     step : ndarray of int of shape (n,)
         Position within its plan, from 0.
+    scene : ndarray of int of shape (n,), default=None
+        Which system of a family the plan was made in, as :func:`collect_transitions` numbers
+        them: 0 for a single system, the position in a sequence, or the seed that was given to a
+        callable. None is 0 everywhere.
+    executed : ndarray of bool of shape (n,), default=None
+        Where b is. False: where the plan had the system, labelled by Eq. 3. True: where the
+        true system was when it was given u, labelled by
+        :func:`reliability.label_executed_transitions`. None is False everywhere.
+
+    Raises
+    ------
+    ValueError
+        If the arrays don't fit together, a state or command is not a finite number, or a label
+        is neither 1 nor 0.
     """
 
     def __init__(
         self,
-        reduced: NDArray[np.float64],
-        command: NDArray[np.float64],
-        next_reduced: NDArray[np.float64],
-        y: NDArray[np.int64],
-        plan: NDArray[np.int64],
-        step: NDArray[np.int64],
+        reduced: ArrayLike,
+        command: ArrayLike,
+        next_reduced: ArrayLike,
+        y: ArrayLike,
+        plan: ArrayLike,
+        step: ArrayLike,
+        scene: ArrayLike | None = None,
+        executed: ArrayLike | None = None,
     ) -> None:
-        _check_lengths(reduced, command, next_reduced, y, plan, step)
-        self.command, self.y, self.plan, self.step = command, y, plan, step
-        follows_on = np.zeros(len(reduced), dtype=np.bool_)
-        ends, starts = as_bits(next_reduced[:-1]), as_bits(reduced[1:])
-        follows_on[:-1] = (ends == starts).all(axis=1)
-        both = np.stack([reduced, next_reduced], axis=1)
+        before = as_finite_array(reduced, "reduced", (None, None))
+        n, width = before.shape
+        after = as_finite_array(next_reduced, "next_reduced", (n, width))
+        none = np.zeros(n, dtype=np.int64)
+        columns = {
+            "command": as_finite_array(command, "command", (n, None)),
+            "y": y,
+            "plan": plan,
+            "step": step,
+            "scene": none if scene is None else scene,
+            "executed": none.astype(np.bool_) if executed is None else executed,
+        }
+        self._set_columns(checked_columns(columns, n))
+        follows_on = np.zeros(n, dtype=np.bool_)
+        follows_on[:-1] = (as_bits(after[:-1]) == as_bits(before[1:])).all(axis=1)
+        both = np.stack([before, after], axis=1)
         kept = np.stack([np.ones_like(follows_on), ~follows_on], axis=1)
         self._states = TrimmedRows.pack(both[kept])
         self._first = _first_states(follows_on)
+
+    def _set_columns(self, columns: dict[str, NDArray[Any]]) -> None:
+        self.command: NDArray[np.float64] = columns["command"]
+        self.y: NDArray[np.int64] = columns["y"]
+        self.plan: NDArray[np.int64] = columns["plan"]
+        self.step: NDArray[np.int64] = columns["step"]
+        self.scene: NDArray[np.int64] = columns["scene"]
+        self.executed: NDArray[np.bool_] = columns["executed"]
 
     @classmethod
     def _of_states(
@@ -71,26 +106,30 @@ class Transitions:
     ) -> Transitions:
         made = cls.__new__(cls)
         made._states, made._first = states, first
-        for name in _COLUMNS:
-            setattr(made, name, columns[name])
+        made._set_columns(columns)
         return made
+
+    def _columns(self) -> dict[str, NDArray[Any]]:
+        return {name: getattr(self, name) for name in _COLUMNS}
 
     @property
     def reduced(self) -> NDArray[np.float64]:
-        """The states b of each transition, shape (n, reduced_dim)."""
+        """The states b of each transition, shape (n, reduced_dim).
+
+        With scenes of different ``reduced_dim``, the largest; the last point of the others is
+        repeated. Select the rows of one scene to give them to its system.
+        """
         return self._states.unpack(self._first)
 
     @property
     def next_reduced(self) -> NDArray[np.float64]:
-        """The states b' of each transition, shape (n, reduced_dim)."""
+        """The states b' of each transition, shape (n, reduced_dim), like ``reduced``."""
         return self._states.unpack(self._first + 1)
 
     @property
     def nbytes(self) -> int:
         """Bytes that the transitions take up in memory."""
-        stored = (self._states.values, self._states.lengths, self._first)
-        columns = (getattr(self, name) for name in _COLUMNS)
-        return sum(array.nbytes for array in (*stored, *columns))
+        return sum(array.nbytes for array in self.to_arrays().values())
 
     def __len__(self) -> int:
         return len(self._first)
@@ -105,20 +144,33 @@ class Transitions:
         follows_on[:-1] = first[1:] == first[:-1] + 1
         pairs = np.stack([first, first + 1], axis=1)
         kept = np.stack([np.ones_like(follows_on), ~follows_on], axis=1)
-        columns = {name: getattr(self, name)[index] for name in _COLUMNS}
+        columns = {name: column[index] for name, column in self._columns().items()}
         states = self._states.take(pairs[kept])
         return self._of_states(states, _first_states(follows_on), columns)
 
-    def trim_unreliable_tail(self, n_after: int) -> Transitions:
-        """Leave out what each plan did long after its execution went astray for good.
+    def __repr__(self) -> str:
+        dims = np.unique(np.append(self._states.widths, self._states.width)).tolist()
+        if not len(self):
+            return f"<Transitions: none, reduced_dim {dims[0]}>"
+        dim = str(dims[0]) if len(dims) == 1 else f"{dims[0]} to {dims[-1]}"
+        n_plans, n_scenes = len(np.unique(self.plan)), len(np.unique(self.scene))
+        return (
+            f"<Transitions: {_counted(len(self), 'transition')} of {_counted(n_plans, 'plan')} in "
+            f"{_counted(n_scenes, 'scene')}, {np.mean(self.y == UNRELIABLE):.1%} Unreliable, "
+            f"reduced_dim {dim}, command_dim {self.command.shape[1]}>"
+        )
 
-        From the mistake on that an execution never recovers from, all is Unreliable, whatever it
-        is: it says where executions are that went wrong before, and not what makes them go wrong.
+    def trim_unreliable_tail(self, n_after: int) -> Transitions:
+        """Leave out what each plan did long after its execution had diverged for good.
+
+        Once an execution has diverged and does not come back, all that follows is Unreliable by
+        Eq. 3, whatever it is. Such rows tell where executions are that diverged earlier, and
+        not what makes them diverge. Rows that are labelled from executed states are all kept.
 
         Parameters
         ----------
         n_after : int
-            Transitions to keep of those that end a plan and are all Unreliable, the first ones.
+            How many of the Unreliable transitions that end a plan to keep, the first ones.
 
         Returns
         -------
@@ -127,60 +179,111 @@ class Transitions:
         check_count(n_after, "n_after")
         _, plan = np.unique(self.plan, return_inverse=True)
         last = np.full(plan.max(initial=-1) + 1, -1)
-        np.maximum.at(last, plan, np.where(self.y == RELIABLE, self.step, -1))
-        return self[self.step <= last[plan] + n_after]
+        planned = ~self.executed
+        reliable = planned & (self.y == RELIABLE)
+        np.maximum.at(last, plan[planned], np.where(reliable, self.step, -1)[planned])
+        return self[self.executed | (self.step <= last[plan] + n_after)]
 
     @classmethod
     def concatenate(cls, parts: Sequence[Transitions]) -> Transitions:
-        """Join transitions end to end; plan ids are kept as they are."""
-        if not parts:
-            raise ValueError("parts must hold at least one Transitions, got none.")
-        states = TrimmedRows.concatenate([part._states for part in parts])
-        n_before = np.cumsum([0, *(len(part._states) for part in parts)])
-        first = [part._first + n for part, n in zip(parts, n_before[:-1], strict=True)]
-        columns = {
-            name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS
-        }
-        return cls._of_states(states, np.concatenate(first), columns)
+        """Join transitions end to end, and keep the plans of different parts apart.
 
-    def features(self, system: System) -> NDArray[Any]:
-        """Describe the transitions to an estimator, as ``system`` sees them.
+        Plan ids are kept where they differ between all parts. The plans of a part that shares an
+        id with an earlier one are numbered anew, in order, after the greatest id so far. Scene
+        ids are kept as they are, so that :meth:`features` goes on to understand them: join
+        transitions of the same system, sequence or callable.
+
+        Parameters
+        ----------
+        parts : sequence of Transitions
+            At least one. Rows of one plan that are in several parts become several plans.
+
+        Returns
+        -------
+        transitions : Transitions
+        """
+        joined = join(parts)
+        joined.plan = np.concatenate(ids_apart([part.plan for part in parts]))
+        return joined
+
+    def features(self, system: SceneArgument) -> NDArray[Any]:
+        """Describe the transitions to an estimator, each in its scene.
+
+        Parameters
+        ----------
+        system : System, sequence of Systems, or callable ``random_state -> System``
+            What the transitions were collected from, or the same scenes with other features. A
+            single system describes all rows, which must then be of one scene.
 
         Returns
         -------
         X : ndarray of shape (n, n_features)
+
+        Raises
+        ------
+        ValueError
+            If the transitions are of scenes that ``system`` does not have.
         """
-        # A million grids fit into memory once, not twice: parts are not joined but filled in.
-        none = self._described(system, slice(0, 0))
+        family = SceneFamily(system)
+        scenes = np.unique(self.scene) if len(self) else np.zeros(1, dtype=np.int64)
+        family.check_ids(scenes)
+        first = family.system(int(scenes[0]))
+        none = first.features(*np.empty((2, 0, first.reduced_dim)))
         X = np.empty((len(self), *none.shape[1:]), dtype=none.dtype)
-        for first in range(0, len(self), _DESCRIBED_AT_ONCE):
-            rows = slice(first, first + _DESCRIBED_AT_ONCE)
-            X[rows] = self._described(system, rows)
+        for scene in scenes:
+            described = family.system(int(scene))
+            rows = np.flatnonzero(self.scene == scene)
+            # A million grids fit into memory once, not twice: parts are filled in, not joined.
+            for begin in range(0, len(rows), _DESCRIBED_AT_ONCE):
+                chunk = rows[begin : begin + _DESCRIBED_AT_ONCE]
+                X[chunk] = self._described(described, chunk)
         return X
 
-    def _described(self, system: System, rows: slice) -> NDArray[Any]:
+    def _described(self, system: System, rows: NDArray[np.int64]) -> NDArray[Any]:
         first = self._first[rows]
         return system.features(self._states.unpack(first), self._states.unpack(first + 1))
 
     def divergence_onsets(self) -> NDArray[np.bool_]:
-        """Tell where execution and prediction part, from where they had already parted.
+        """Mark each Unreliable transition at which an execution and its plan diverge.
+
+        These are the Unreliable transitions that follow a Reliable one of the same plan, or begin
+        their plan; the other Unreliable ones come after. Where labels are from executed states,
+        each Unreliable transition is marked, since its prediction began where the system was.
 
         Returns
         -------
         mask : ndarray of bool of shape (n,)
-            Unreliable transitions that follow a Reliable one or begin their plan.
         """
         follows = np.zeros(len(self), dtype=np.bool_)
         follows[1:] = (self.plan[1:] == self.plan[:-1]) & (self.step[1:] == self.step[:-1] + 1)
-        was_reliable = np.ones(len(self), dtype=np.bool_)
-        was_reliable[1:] = ~follows[1:] | (self.y[:-1] == RELIABLE)
-        return (self.y == UNRELIABLE) & was_reliable
+        had_diverged = np.zeros(len(self), dtype=np.bool_)
+        had_diverged[1:] = follows[1:] & (self.y[:-1] == UNRELIABLE) & ~self.executed[:-1]
+        return (self.y == UNRELIABLE) & (self.executed | ~had_diverged)
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays that a file of these transitions holds."""
+        return {**self._columns(), **self._states.to_arrays(), "first": self._first}
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> Transitions:
+        """Make transitions of what :meth:`to_arrays` returned.
+
+        Raises
+        ------
+        ValueError
+            If the arrays don't belong together.
+        """
+        states = TrimmedRows.from_arrays(arrays)
+        first = as_integers(arrays["first"], "first", len(arrays["y"]))
+        if len(first) and not (first.min() >= 0 and first.max() < len(states) - 1):
+            raise ValueError(f"first must number states of {len(states)} that another follows.")
+        columns = {name: arrays[name] for name in _COLUMNS}
+        columns["command"] = as_finite_array(columns["command"], "command", (len(first), None))
+        return cls._of_states(states, first, checked_columns(columns, len(first)))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write one npz file; whatever stood there is replaced only when all is written."""
-        arrays = {name: getattr(self, name) for name in _COLUMNS}
-        states = {name: getattr(self._states, name) for name in _STATES}
-        write_arrays(path, arrays | states | {"first": self._first}, format_version=FORMAT_VERSION)
+        write_arrays(path, self.to_arrays(), format_version=FORMAT_VERSION)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Transitions:
@@ -189,23 +292,30 @@ class Transitions:
         Raises
         ------
         ValueError
-            If the file is no such file, is truncated, or has another format version.
+            If the file is no such file, is truncated or damaged, has another format version, or
+            holds arrays that don't belong together.
         """
-        names = {"first", *_COLUMNS, *_STATES}
+        names = {"first", *_COLUMNS, *ARRAYS}
         arrays = read_arrays(path, names, format_version=FORMAT_VERSION, kind="transitions")
-        states = TrimmedRows(arrays["values"], arrays["lengths"], int(arrays["width"]))
-        return cls._of_states(states, arrays["first"], arrays)
+        try:
+            return cls.from_arrays(arrays)
+        except ValueError as error:
+            raise ValueError(f"{path} is not a whole file of transitions ({error})") from error
 
 
-def _check_lengths(reduced: Any, *others: Any) -> None:
-    for name, array in zip(("reduced", *_OTHERS), (reduced, *others), strict=True):
-        n_dims = 2 if name in ("reduced", "command", "next_reduced") else 1
-        if not isinstance(array, np.ndarray) or array.ndim != n_dims:
-            raise ValueError(f"{name} must be an array of {n_dims} dimensions.")
-        if len(array) != len(reduced):
-            raise ValueError(
-                f"{name} must have a row per transition, {len(reduced)}, got {len(array)}."
-            )
+def join(parts: Sequence[Transitions]) -> Transitions:
+    """Join transitions end to end, with their ids as they are."""
+    if not parts:
+        raise ValueError("parts must hold at least one Transitions, got none.")
+    states = TrimmedRows.concatenate([part._states for part in parts])
+    n_before = np.cumsum([0, *(len(part._states) for part in parts)])
+    first = [part._first + n for part, n in zip(parts, n_before[:-1], strict=True)]
+    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS}
+    return Transitions._of_states(states, np.concatenate(first), columns)
+
+
+def _counted(n: int, noun: str) -> str:
+    return f"{n:,} {noun}" + ("s" if n != 1 else "")
 
 
 def _first_states(follows_on: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -1,5 +1,6 @@
 """What can only be seen from outside a process: memory, exit, interruption, imports."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -147,3 +148,38 @@ print("torch" in sys.modules)
 """
     )
     assert process.stdout == "True\nFalse\n"
+
+
+COLLECT = """
+import os, signal, sys
+from planners import BiasedRRTConnect
+from reliability import collect_transitions
+from toy_systems import Disc
+
+class Deadly(Disc):
+    def rollout(self, state, commands):
+        if sum(name.endswith("item") for name in os.listdir(sys.argv[2])) == int(sys.argv[1]):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().rollout(state, commands)
+
+for path in sys.argv[2:]:
+    collect_transitions(Deadly(), BiasedRRTConnect(None), 24, random_state=1, path=path)
+"""
+
+
+def test_a_collection_that_was_killed_goes_on_and_ends_with_the_same_bytes(tmp_path):
+    killed, whole = tmp_path / "killed", tmp_path / "whole"
+
+    def collect(limit, *paths):
+        command = [sys.executable, "-c", COLLECT, str(limit), *map(str, paths)]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        return subprocess.run(command, env=environment, timeout=300).returncode
+
+    assert collect(9, killed) == -signal.SIGKILL
+    assert len(list(killed.glob("*.item"))) == 9
+    assert collect(999, killed, whole) == 0
+    contents = [
+        {file.name: file.read_bytes() for file in path.iterdir()} for path in (killed, whole)
+    ]
+    assert contents[0] == contents[1]
+    assert len(contents[0]) == 24 + 1

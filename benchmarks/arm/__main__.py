@@ -80,9 +80,10 @@ def collect(options: argparse.Namespace) -> Transitions:
         options.plans,
         n_jobs=options.jobs,
         random_state=DATA_SEED,
-        path=options.out / f"transitions-{options.plans}",
+        path=options.out / "transitions",
         verbose=1,
     )
+    transitions.save(options.out / "transitions.npz")
     unreliable = transitions.y == UNRELIABLE
     already = 1 - transitions.divergence_onsets().sum() / unreliable.sum()
     print(f"Collecting took {time.perf_counter() - began:.0f} s.")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
 
 from benchmarks.car.compared_planners import careful_planner
@@ -21,7 +20,6 @@ from systems import Car, CarScene, random_car_scene
 
 SCENE_SEED, DATA_SEED, TRAINING_SEED = 1, 2, 3
 ITERATIONS = 5000
-IDS_PER_ROUND = 10**9
 # Even where the classifier is wrong, a round must find out.
 EXPLORING_K = 6.0
 # A mistake costs three times as much as a missed chance.
@@ -36,54 +34,45 @@ def training_scene(round_number: int, i: int) -> CarScene:
 def collect_round(
     round_number: int, classifier: Any, n_scenes: int, n_plans: int, n_jobs: int, folder: Path
 ) -> tuple[Transitions, np.ndarray]:
-    """Collect from scenes of their own, or load what an earlier run collected.
+    """Collect plans in scenes of the round's own, with what the last round learned.
+
+    Parameters
+    ----------
+    round_number : int
+    classifier : fitted classifier or None
+    n_scenes, n_plans : int
+        Scenes, and plans in each.
+    n_jobs : int
+    folder : Path
+        The round is kept in a folder of its own in it; a round that was interrupted goes on.
 
     Returns
     -------
     transitions : Transitions
-        Plan ids differ between all rounds and scenes.
     X : ndarray of shape (n, n_features)
     """
-    file = folder / f"transitions-{round_number}-{n_scenes}x{n_plans}.npz"
-    first_id = round_number * IDS_PER_ROUND
-    if not file.exists():
-        parts = joblib.Parallel(n_jobs=n_jobs)(
-            joblib.delayed(_collect_scene)(round_number, i, classifier, n_plans)
-            for i in range(n_scenes)
-        )
-        Transitions.concatenate(
-            [_renumbered(part, first_id + i * n_plans) for i, part in enumerate(parts)]
-        ).save(file)
-    transitions = Transitions.load(file)
-    scene_of_row = (transitions.plan - first_id) // n_plans
-    rows = [
-        transitions[scene_of_row == i].features(Car(training_scene(round_number, i)))
-        for i in range(n_scenes)
-    ]
-    return transitions, np.concatenate(rows)
-
-
-def _collect_scene(round_number: int, i: int, classifier: Any, n_plans: int) -> Transitions:
-    car = Car(training_scene(round_number, i))
-    planner = BiasedRRTConnect(car, transitions_per_edge=1)
+    cars = [Car(training_scene(round_number, i)) for i in range(n_scenes)]
+    planner = BiasedRRTConnect(cars[0], transitions_per_edge=1)
     if classifier is not None:
-        planner = careful_planner(car, classifier)
+        planner = careful_planner(cars[0], classifier)
         planner.set_params(k=EXPLORING_K, max_iterations=ITERATIONS)
-    seed = np.random.SeedSequence([DATA_SEED, round_number, i])
-    return collect_transitions(car, planner, n_plans, random_state=seed)
-
-
-def _renumbered(part: Transitions, first: int) -> Transitions:
-    return Transitions(
-        part.reduced, part.command, part.next_reduced, part.y, part.plan + first, part.step
+    transitions = collect_transitions(
+        cars,
+        planner,
+        n_scenes * n_plans,
+        n_jobs=n_jobs,
+        random_state=np.random.SeedSequence([DATA_SEED, round_number]),
+        path=folder / f"round-{round_number}",
+        verbose=1,
     )
+    return transitions, transitions.features(cars)
 
 
 def informative(transitions: Transitions) -> np.ndarray:
-    """Select Reliable transitions and first mistakes.
+    """Select Reliable transitions and those at which an execution diverges from its plan.
 
-    What follows a mistake is Unreliable whatever it is, and most transitions of plans made
-    without a classifier do.
+    All that follows is Unreliable, whatever it is, and in plans made without a classifier that
+    is most of the transitions.
     """
     return (transitions.y == RELIABLE) | transitions.divergence_onsets()
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
 
 from planners import BiasedRRT
-from reliability import RELIABLE, Transitions, collect_transitions
+from reliability import UNRELIABLE, Transitions, collect_transitions
 from systems import Problem, Rope, Scene, random_rope_scene
 from systems.rope.paper_scenes import load_scene
 from systems.rope.random_scenes import has_slot_and_slit
@@ -30,9 +29,16 @@ K = 10.0
 
 @dataclass(frozen=True)
 class SceneData:
-    """Transitions of one scene, whose reduced states carry PBD ropes."""
+    """Transitions of one or more scenes, whose reduced states carry PBD ropes.
 
-    scene: Scene
+    Attributes
+    ----------
+    scenes : sequence of Scene
+        ``transitions.scene`` says which of them a transition is of.
+    transitions : Transitions
+    """
+
+    scenes: Sequence[Scene]
     transitions: Transitions
 
 
@@ -45,10 +51,10 @@ def collect_simple_hook(folder: Path, n_plans: int, n_jobs: int) -> SceneData:
         n_plans,
         n_jobs=n_jobs,
         random_state=PAPER_SEED,
-        path=folder / f"simple_hook-{n_plans}",
+        path=folder / "simple_hook",
         verbose=1,
     )
-    return SceneData(rope.scene, transitions)
+    return SceneData([rope.scene], transitions)
 
 
 class RopeWithoutSlackLimit(Rope):
@@ -91,16 +97,33 @@ def collect_random_scenes(
     Parameters
     ----------
     folder : Path
-        Holds a file per scene; those that are there are read.
+        Plans that an earlier, interrupted run left there are read.
     plan : Round
-    estimator : classifier of curtains, or None
+    estimator : classifier of "clearance" features, or None
         What has been learned so far.
     n_jobs : int
+
+    Returns
+    -------
+    parts : list of SceneData
+        The first plans in hard scenes, and the others; empty if no scene is hard.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    tasks = (joblib.delayed(_collect_scene)(folder, i, plan, estimator) for i in plan.scenes)
-    found = joblib.Parallel(n_jobs=n_jobs, verbose=5)(tasks)
-    return [data for data in found if data is not None]
+    scenes = [random_scene(i) for i in plan.scenes]
+    if plan.slotted:
+        scenes = [scene for scene in scenes if has_slot_and_slit(scene)]
+    if not scenes:
+        return []
+    seed = plan.scenes.start
+    first = _plans_from_start(scenes, None, 1, seed, folder / "first", n_jobs)
+    last_step = np.append(np.diff(first.plan) != 0, True)
+    hard = first.scene[last_step & (first.y == UNRELIABLE)]
+    if not len(hard):
+        return []
+    hard_scenes = [scenes[i] for i in hard]
+    used = estimator if plan.biased else None
+    others = _plans_from_start(hard_scenes, used, N_MORE, seed, folder / "others", n_jobs)
+    of_hard = np.isin(first.scene, hard)
+    return [SceneData(scenes, first[of_hard]), SceneData(hard_scenes, others)]
 
 
 def random_scene(i: int) -> Scene:
@@ -108,59 +131,76 @@ def random_scene(i: int) -> Scene:
     return random_rope_scene(np.random.SeedSequence([RANDOM_SCENE_SEED, i]))
 
 
-def _collect_scene(folder: Path, i: int, plan: Round, estimator: Any) -> SceneData | None:
-    rope = RopeFromSceneStart(random_scene(i))
-    file, empty = folder / f"scene-{i:05d}.npz", folder / f"scene-{i:05d}.empty"
-    if empty.exists() or (plan.slotted and not has_slot_and_slit(rope.scene)):
-        return None
-    if not file.exists():
-        first = _plans_from_start(rope, None, 1, i)
-        if first is None or first.y[-1] == RELIABLE:
-            empty.touch()
-            return None
-        others = _plans_from_start(rope, estimator if plan.biased else None, N_MORE, i)
-        if others is not None:
-            others.plan += 1
-        Transitions.concatenate([first] if others is None else [first, others]).save(file)
-    return SceneData(rope.scene, Transitions.load(file))
-
-
 def _plans_from_start(
-    rope: RopeFromSceneStart, estimator: Any, n_plans: int, i: int
-) -> Transitions | None:
-    """Collect, or return None if there is no room for a rope or no way through."""
-    planner = BiasedRRT(rope, estimator, k=K, max_iterations=RANDOM_ITERATIONS)
-    seed = np.random.SeedSequence([RANDOM_SCENE_SEED, n_plans, i])
-    try:
-        return collect_transitions(rope, planner, n_plans, random_state=seed)
-    except ValueError:
-        return None
+    scenes: Sequence[Scene],
+    estimator: Any,
+    n_each: int,
+    seed: int,
+    folder: Path,
+    n_jobs: int,
+) -> Transitions:
+    """Collect plans from each scene's own start; a scene that has no room for a rope gives none."""
+    return collect_transitions(
+        [RopeFromSceneStart(scene) for scene in scenes],
+        BiasedRRT(None, estimator, k=K, max_iterations=RANDOM_ITERATIONS),
+        n_each * len(scenes),
+        on_error="skip",
+        n_jobs=n_jobs,
+        random_state=np.random.SeedSequence([RANDOM_SCENE_SEED, n_each, seed]),
+        path=folder,
+        verbose=1,
+    )
 
 
 def as_far_as_allowed(part: SceneData) -> SceneData:
-    """Leave out what each plan did from where g allows it only to ropes that go on."""
-    rope, transitions = Rope(part.scene, features="clearance"), part.transitions
-    kept = [np.arange(0)]
-    for plan in np.unique(transitions.plan):
-        rows = np.flatnonzero(transitions.plan == plan)
-        _, valid = rope.propagate(transitions[rows].reduced, transitions.command[rows])
-        kept.append(rows if valid.all() else rows[: np.argmin(valid)])
-    return SceneData(part.scene, transitions[np.concatenate(kept)])
+    """Leave out the rest of each plan from its first transition that g does not allow.
+
+    Plans were made with :class:`RopeWithoutSlackLimit`, whose g allows more.
+    """
+    data = part.transitions
+    allowed = np.ones(len(data), dtype=bool)
+    for i in np.unique(data.scene):
+        rope = Rope(part.scenes[i], features="clearance")
+        rows = data.scene == i
+        allowed[rows] = rope.propagate(data[rows].reduced, data.command[rows])[1]
+    _, plan = np.unique(data.plan, return_inverse=True)
+    end = np.full(plan.max(initial=-1) + 1, np.iinfo(np.int64).max)
+    np.minimum.at(end, plan[~allowed], data.step[~allowed])
+    return SceneData(part.scenes, data[data.step < end[plan]])
 
 
-def described(parts: Sequence[SceneData], kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the features, labels and plans of all parts; plan ids differ between scenes."""
-    rows, labels, plans, first = [], [], [], 0
+def described(
+    parts: Sequence[SceneData], kind: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Describe the transitions of all parts.
+
+    Returns
+    -------
+    X, y : ndarray
+        Features of the given kind, and labels.
+    plan, scene : ndarray of int
+        Ids that differ between all plans and between all scenes.
+    """
+    if kind != "clearance":
+        parts = [_of_bands(part) for part in parts]
+    rows, scenes, numbers = [], [], {}
     for part in parts:
-        transitions = part.transitions if kind == "clearance" else _of_bands(part)
-        rows.append(transitions.features(Rope(part.scene, features=kind)))
-        labels.append(part.transitions.y)
-        plans.append(part.transitions.plan + first)
-        first = int(plans[-1].max(initial=first - 1)) + 1
-    return np.concatenate(rows), np.concatenate(labels), np.concatenate(plans)
+        ropes = [Rope(scene, features=kind) for scene in part.scenes]
+        rows.append(part.transitions.features(ropes))
+        of_part = [numbers.setdefault(id(scene), len(numbers)) for scene in part.scenes]
+        scenes.append(np.array(of_part)[part.transitions.scene])
+    whole = Transitions.concatenate([part.transitions for part in parts])
+    return np.concatenate(rows), whole.y, whole.plan, np.concatenate(scenes)
 
 
-def _of_bands(part: SceneData) -> Transitions:
-    rope, data = Rope(part.scene, features="clearance"), part.transitions
-    before, after = rope.bands(data.reduced), rope.bands(data.next_reduced)
-    return Transitions(before, data.command, after, data.y, data.plan, data.step)
+def _of_bands(part: SceneData) -> SceneData:
+    """Leave out the PBD ropes of the reduced states, which other features don't know."""
+    of_bands = []
+    for i in np.unique(part.transitions.scene):
+        rope = Rope(part.scenes[i], features="clearance")
+        data = part.transitions[part.transitions.scene == i]
+        before, after = rope.bands(data.reduced), rope.bands(data.next_reduced)
+        of_bands.append(
+            Transitions(before, data.command, after, data.y, data.plan, data.step, data.scene)
+        )
+    return SceneData(part.scenes, Transitions.concatenate(of_bands))

@@ -3,7 +3,8 @@
 Run as ``python -m benchmarks.rope.table1 --jobs 2``. Every trial starts at the scene's start and
 has a seed of its own, the same in all columns. It is a success if its plan is found within the time
 limit and its execution ends within 0.025 m of the goal. Each finished trial is a file in
-``--out``: a run that was interrupted goes on where it stopped. Columns are ``none`` and ``pbd``,
+``--out``, in a folder per column: a run that was interrupted goes on where it stopped, and one with
+another planner is refused there. Columns are ``none`` and ``pbd``,
 without a classifier and without or with PBD ropes, models that come with the examples
 (``paper``, ``ours``, ``vector``), or the joblib file of any fitted estimator of the rope's
 features.
@@ -16,12 +17,11 @@ import itertools
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
 from scipy.stats import binomtest
 
-from benchmarks.rope.table1_trials import run_trial
-from reliability import load_estimator
+from benchmarks.rope.table1_trials import Column, Trial
+from reliability import Job, run_jobs
 from systems.rope.features.registry import FEATURES
 from systems.rope.paper_scenes import SCENE_NAMES
 
@@ -62,39 +62,34 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, default=Path("build/table1"))
     options = parser.parse_args(arguments)
+    columns = {name: _column(name, options) for name in options.columns}
+    stores = {name: column.store(options.out / Path(name).stem) for name, column in columns.items()}
     seeds = range(options.first_seed, options.first_seed + options.seeds)
-    paths = {name: COLUMNS.get(name, Path(name)) for name in options.columns}
-    folders = {
-        name: options.out / _description(name, path, options) for name, path in paths.items()
-    }
     keys = list(itertools.product(seeds, options.scenes, options.columns))
-    trials = joblib.Parallel(n_jobs=options.jobs, verbose=5)(
-        joblib.delayed(run_trial)(
-            scene,
-            seed,
-            paths[name],
-            UNCLASSIFIED.get(name, options.features),
-            options,
-            folders[name],
-        )
+    jobs = [
+        Job(f"{scene}-seed-{seed:03d}", Trial(columns[name], scene, seed), stores[name])
         for seed, scene, name in keys
-    )
+    ]
+    trials = run_jobs(jobs, n_jobs=options.jobs, verbose=1, unit="trial")
     rows: dict[str, dict[str, list[dict[str, Any]]]] = {}
     for (_, scene, name), trial in zip(keys, trials, strict=True):
-        rows.setdefault(scene, {}).setdefault(name, []).append(trial)
+        rows.setdefault(scene, {}).setdefault(name, []).append(trial.facts)
     table = format_table(rows)
     options.out.joinpath("table.md").write_text(table)
     print(f"{table}\nTrials and table are in {options.out}.")
 
 
-def _description(name: str, path: Path | None, options: argparse.Namespace) -> str:
-    """Name a folder after everything that makes trials differ."""
-    planner = name
-    if path is not None:
-        digest = joblib.hash(load_estimator(path))[:8]
-        accuracy = "own" if options.accuracy is None else f"{options.accuracy:g}"
-        planner = f"{path.stem}-{digest}-k{options.k:g}-accuracy-{accuracy}"
-    return f"{planner}-{options.engine}-{options.time_limit:g}s"
+def _column(name: str, options: argparse.Namespace) -> Column:
+    if name in UNCLASSIFIED:
+        return Column(None, UNCLASSIFIED[name], options.engine, time_limit=options.time_limit)
+    return Column(
+        COLUMNS.get(name, Path(name)),
+        options.features,
+        options.engine,
+        options.time_limit,
+        options.k,
+        options.accuracy,
+    )
 
 
 def format_table(trials: dict[str, dict[str, list[dict[str, Any]]]]) -> str:

@@ -1,4 +1,4 @@
-"""Training of the rope's models: the paper's VoxNet, ours on curtains, and one on vectors."""
+"""Training of the rope's models: the paper's VoxNet, ours, and one on thirteen numbers."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def train_paper(simple_hook: SceneData, checkpoint: Path) -> Any:
     hour; a tenth of the transitions is held out for p_acc, whatever plan they are of. Another
     tenth of the plans is kept apart.
     """
-    X, y, plans = described([simple_hook], "voxels")
+    X, y, plans, _ = described([simple_hook], "voxels")
     training, apart = _split(y, plans, HELD_OUT)
     classifier = TransitionReliabilityClassifier(
         VoxNet(pooling=2),
@@ -107,7 +107,7 @@ def train_paper(simple_hook: SceneData, checkpoint: Path) -> Any:
 
 def train_vector(simple_hook: SceneData) -> Any:
     """Train gradient boosting on the thirteen numbers, on Simple Hook alone."""
-    X, y, plans = described([simple_hook], "vector")
+    X, y, plans, _ = described([simple_hook], "vector")
 
     def fitted(rows: np.ndarray) -> Any:
         boosting = HistGradientBoostingClassifier(
@@ -125,7 +125,7 @@ def train_vector(simple_hook: SceneData) -> Any:
 
 
 def train_ours(simple_hook: SceneData, folder: Path, n_jobs: int) -> Any:
-    """Train gradient boosting on curtains, round by round, and hold out whole plans and scenes."""
+    """Train gradient boosting on "clearance" features, round by round; hold out whole scenes."""
     parts, classifier = [worth_learning(simple_hook)], None
     for i, plan in enumerate(ROUNDS):
         found = collect_random_scenes(folder / f"random{i}", plan, classifier, n_jobs)
@@ -137,7 +137,7 @@ def train_ours(simple_hook: SceneData, folder: Path, n_jobs: int) -> Any:
 def worth_learning(part: SceneData) -> SceneData:
     """Leave out what g does not allow, and what plans did long after they went wrong for good."""
     transitions = as_far_as_allowed(part).transitions
-    return SceneData(part.scene, transitions.trim_unreliable_tail(N_AFTER))
+    return SceneData(part.scenes, transitions.trim_unreliable_tail(N_AFTER))
 
 
 def fit_clearance(parts: Sequence[SceneData]) -> Any:
@@ -146,9 +146,7 @@ def fit_clearance(parts: Sequence[SceneData]) -> Any:
     Both weigh the same, and so do both labels in either. Each transition is learned as it is or
     in one of its three mirror images.
     """
-    X, y, plans = described(parts, "clearance")
-    n_each = [len(part.transitions) for part in parts]
-    scenes = np.repeat(np.arange(len(parts)), n_each)
+    X, y, plans, scenes = described(parts, "clearance")
     weight = np.zeros(len(y))
     for kind in (2 * (scenes > 0) + y == i for i in range(4)):
         weight[kind] = len(y) / 4 / max(1, kind.sum())
@@ -193,7 +191,7 @@ def provenance(
             "random scenes": RANDOM_SCENE_SEED,
             "training": TRAINING_SEED,
         },
-        "scenes": len(parts),
+        "scenes": len({id(part.scenes[i]) for part in parts for i in part.transitions.scene}),
         "plans": sum(len(np.unique(part.transitions.plan)) for part in parts),
         "transitions": sum(len(part.transitions) for part in parts),
         "accuracy by transition": by_transition,

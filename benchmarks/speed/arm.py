@@ -86,7 +86,7 @@ def compare_planning(arm: PlanarArm, model: Any, n_queries: int) -> None:
 
 def compare_batches(arm: PlanarArm, options: argparse.Namespace) -> None:
     """Time a forest asked about many extensions at once, and about one transition at a time."""
-    transitions = load_transitions(options.folder)[::20]
+    transitions = Transitions.load(options.folder / "transitions.npz")[::20]
     forest = RandomForestClassifier(50, max_depth=12, random_state=0)
     forest.fit(transitions.features(arm), transitions.y)
     problems = queries(arm, 8)
@@ -100,12 +100,6 @@ def compare_batches(arm: PlanarArm, options: argparse.Namespace) -> None:
         f"{1e6 * times['singly']:.0f} µs one by one: {times['singly'] / times['batched']:.0f} "
         "times faster"
     )
-
-
-def load_transitions(folder: Path) -> Transitions:
-    """Read the shards that the example collected."""
-    shards = sorted(folder.glob("transitions-*/shard-*.npz"))
-    return Transitions.concatenate([Transitions.load(shard) for shard in shards])
 
 
 def queries(arm: PlanarArm, n: int) -> list[Problem]:

@@ -1,0 +1,183 @@
+"""One plan of a collection: made, executed and labelled, or why it gave no transitions."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reliability.item_files import Item
+from reliability.labels import label_executed_transitions, label_transitions
+from reliability.scenes import SceneFamily, plan_seeds
+from reliability.transitions import Transitions, join
+from systems.errors import SimulationDivergedError
+from systems.system import Array, Problem, System
+
+LABELS = ("plan", "executed", "both")
+EXECUTED, UNSOLVED, DIVERGED, FAILED = "executed", "unsolved", "diverged", "failed"
+_LONGEST_PROBLEM = 500
+
+
+class Planner(Protocol):
+    """What collection asks of a planner: those of :mod:`planners` have it."""
+
+    system: Any
+    random_state: Any
+
+    def plan(self, start_reduced: NDArray[np.float64], goal: NDArray[np.float64]) -> Any:
+        """Return a result with ``success``, ``reduced`` and ``commands``."""
+
+
+class PlanFailedError(RuntimeError):
+    """Planning, executing or labelling a plan of a collection raised an exception.
+
+    Its cause is that exception.
+
+    Attributes
+    ----------
+    facts : dict
+        ``plan``, the plan's number; ``scene``; ``random_state``, the planner's; ``problem`` and
+        ``error``, in words.
+    """
+
+    def __init__(self, facts: dict[str, Any], cause: Exception) -> None:
+        super().__init__(facts, cause)
+        self.facts = facts
+        # An exception that comes from another process has lost its cause.
+        self.__cause__ = cause
+
+    def __str__(self) -> str:
+        return tell_failure(self.facts)
+
+
+def tell_failure(facts: dict[str, Any]) -> str:
+    """Return a sentence about a plan that failed."""
+    return (
+        f"Plan {facts['plan']} (scene {facts['scene']}, random_state of the planner "
+        f"{facts['random_state']}) failed with {facts['error']}. Its problem: {facts['problem']}"
+    )
+
+
+@dataclass(frozen=True)
+class PlanTask:
+    """Makes, executes and labels one plan of a collection.
+
+    All that is random follows from the collection's seed and the plan's number.
+
+    Attributes
+    ----------
+    source : System or callable
+        The plan's system, or what makes it of ``scene``.
+    scene : int
+    planner : Planner
+        A template, whose ``system`` and ``random_state`` are set.
+    labels : {"plan", "executed", "both"}
+    on_error : {"raise", "skip"}
+    seed : int
+    plan : int
+    """
+
+    source: System | Callable[[int], System]
+    scene: int
+    planner: Planner
+    labels: str
+    on_error: str
+    seed: int
+    plan: int
+
+    def __call__(self) -> Item:
+        """Return the transitions, or what became of the plan instead.
+
+        Raises
+        ------
+        PlanFailedError
+            If the plan failed and ``on_error`` is "raise".
+        """
+        problem_seed, planner_seed, _ = plan_seeds(self.seed, self.plan)
+        random_state = int(planner_seed.generate_state(1)[0])
+        problem = None
+        try:
+            system = SceneFamily(self.source).system(self.scene)
+            problem = system.sample_problem(problem_seed)
+            transitions = self._transitions(system, problem, random_state)
+        except SimulationDivergedError:
+            return Item({"outcome": DIVERGED})
+        except Exception as error:
+            facts = self._failure(error, problem, random_state)
+            if self.on_error == "raise":
+                raise PlanFailedError(facts, _portable(error)) from error
+            return Item({"outcome": FAILED, "failure": facts})
+        if transitions is None:
+            return Item({"outcome": UNSOLVED})
+        facts = {"outcome": EXECUTED, "n_transitions": len(transitions)}
+        return Item(facts, transitions.to_arrays())
+
+    def _transitions(
+        self, system: System, problem: Problem, random_state: int
+    ) -> Transitions | None:
+        planner = copy.copy(self.planner)
+        planner.system, planner.random_state = system, random_state
+        plan = planner.plan(system.reduce(problem.start), problem.goal)
+        if not plan.success:
+            return None
+        rollout = system.rollout(problem.start, plan.commands)
+        executed = np.array([system.reduce(state) for state in rollout.states])
+        parts = []
+        if self.labels != "executed":
+            parts.append(self._of_plan(system, plan, executed))
+        if self.labels != "plan":
+            parts.append(self._of_execution(system, plan, executed))
+        return join(parts)
+
+    def _of_plan(self, system: System, plan: Any, executed: Array) -> Transitions:
+        """Label the plan's own transitions; those that the execution never came to are left out."""
+        n = len(executed) - 1
+        y = label_transitions(plan.reduced, executed, system.close)[:n]
+        return self._rows(
+            plan.reduced[:n], plan.commands[:n], plan.reduced[1 : n + 1], y, np.arange(n), False
+        )
+
+    def _of_execution(self, system: System, plan: Any, executed: Array) -> Transitions:
+        """Label what g predicts from the executed states."""
+        found = label_executed_transitions(executed, plan.commands, system.propagate, system.close)
+        commands = plan.commands[found.step]
+        return self._rows(found.reduced, commands, found.next_reduced, found.y, found.step, True)
+
+    def _rows(
+        self,
+        reduced: Array,
+        command: Array,
+        next_reduced: Array,
+        y: NDArray[np.int64],
+        step: NDArray[np.int64],
+        from_execution: bool,
+    ) -> Transitions:
+        plan, scene = np.full(len(y), self.plan), np.full(len(y), self.scene)
+        executed = np.full(len(y), from_execution)
+        return Transitions(reduced, command, next_reduced, y, plan, step, scene, executed)
+
+    def _failure(self, error: Exception, problem: Any, random_state: int) -> dict[str, Any]:
+        words = "not drawn yet" if problem is None else repr(problem)
+        if len(words) > _LONGEST_PROBLEM:
+            words = f"{words[:_LONGEST_PROBLEM]}…"
+        return {
+            "plan": self.plan,
+            "scene": self.scene,
+            "random_state": random_state,
+            "problem": words,
+            "error": repr(error),
+        }
+
+
+def _portable(error: Exception) -> Exception:
+    """Return an exception that can go to another process, as like this one as possible."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return RuntimeError(repr(error))
+    return error
