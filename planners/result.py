@@ -28,6 +28,10 @@ class PlanStatus(Enum):
         "No plan was found within time_limit. Raise time_limit, or lower k so that more "
         "Unreliable transitions are accepted."
     )
+    TERMINATED = (
+        "No plan was found before OMPL's termination condition became true. Allow the planner "
+        "more time, or lower k so that more Unreliable transitions are accepted."
+    )
 
 
 @dataclass(frozen=True, eq=False)
