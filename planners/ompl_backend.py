@@ -1,29 +1,22 @@
 """OMPL's own RRT-Connect, run on our problems.
 
-OMPL's random numbers come from generators that are all seeded from one sequence of the process.
-Here that sequence is borrowed for as long as it takes to seed a search's generators, and then put
-back to where it was. Whatever OMPL can reach holds arrays and our own objects only: a path from a
-motion validator back to its space information would never be freed.
+Whatever OMPL can reach holds arrays and our own objects only: a path from a motion validator back
+to its space information would never be freed.
 """
 
 from __future__ import annotations
 
-import os
-import threading
 from typing import Any
 
 import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
-from ompl import util as ou
 
 from planners.budget import Budget
 from planners.edge_checker import EdgeChecker
+from planners.ompl_globals import BorrowedSeeds, Silence
 from planners.planning_problem import PlanningProblem
 from systems.system import Array
-
-# Longer sequences of seeds are not replayed: 1,000 seeds take two milliseconds.
-MOST_SEEDS_REPLAYED = 1000
 
 
 def ompl_rrt_connect(
@@ -53,7 +46,7 @@ def ompl_rrt_connect(
     vertices : ndarray of shape (n, d) or None
         Ends of the path's edges; None without a solution.
     """
-    with _silence, _BorrowedSeeds(seed) as seeds:
+    with Silence(), BorrowedSeeds(seed) as seeds:
         setup = _simple_setup(problem)
         information = setup.getSpaceInformation()
         information.setMotionValidator(
@@ -76,7 +69,7 @@ def ompl_rrt_connect(
 
 
 def _simple_setup(problem: PlanningProblem) -> Any:
-    setup = og.SimpleSetup(real_vector_space(problem.system.bounds))
+    setup = og.SimpleSetup(_space(problem.system.bounds))
     information = setup.getSpaceInformation()
     # The motion validator asks g about whole motions.
     setup.setStateValidityChecker(ob.AllValidStateValidityChecker(information))
@@ -89,8 +82,7 @@ def _simple_setup(problem: PlanningProblem) -> Any:
     return setup
 
 
-def real_vector_space(bounds: Array) -> Any:
-    """Make OMPL's space of real vectors within bounds, shape (2, d)."""
+def _space(bounds: Array) -> Any:
     space = ob.RealVectorStateSpace(bounds.shape[1])
     limits = ob.RealVectorBounds(bounds.shape[1])
     for i, (low, high) in enumerate(bounds.T):
@@ -127,84 +119,3 @@ class _EdgeValidator(ob.MotionValidator):
 class _AnyMotion(ob.MotionValidator):
     def checkMotion(self, start: Any, end: Any) -> bool:  # noqa: N802
         return True
-
-
-class _Silence:
-    """Keeps OMPL from logging while any thread searches."""
-
-    def __init__(self) -> None:
-        self.lock = threading.Lock()
-        self._n_searches = 0
-        self._level: Any = None
-
-    def __enter__(self) -> None:
-        with self.lock:
-            if self._n_searches == 0:
-                self._level = ou.getLogLevel()
-                ou.setLogLevel(ou.LOG_NONE)
-            self._n_searches += 1
-
-    def __exit__(self, *_: object) -> None:
-        with self.lock:
-            self._n_searches -= 1
-            if self._n_searches == 0:
-                ou.setLogLevel(self._level)
-
-
-class _BorrowedSeeds:
-    """OMPL's process-wide sequence of seeds, begun anew at a seed and then put back.
-
-    The lock keeps threads apart while they seed. It is not held during a search, so that
-    estimators and systems may themselves plan.
-    """
-
-    lock = threading.Lock()
-
-    def __init__(self, seed: int) -> None:
-        self._seed = seed
-        self._borrowed = False
-
-    def __enter__(self) -> _BorrowedSeeds:
-        self.lock.acquire()
-        self._borrowed = True
-        self._first = ou.RNG.getSeed()
-        self._next = ou.RNG().getLocalSeed()
-        # OMPL calls a second seeding an error in its log, though it works.
-        ou.RNG.setSeed(self._seed)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.give_back()
-
-    def give_back(self) -> None:
-        """Put the sequence back to where it was; does nothing the second time."""
-        if self._borrowed:
-            self._borrowed = False
-            _put_back(self._first, self._next)
-            self.lock.release()
-
-
-def _put_back(first: int, following: int) -> None:
-    """Make OMPL's sequence of seeds be the one of ``first``, with ``following`` up next."""
-    ou.RNG.setSeed(first)
-    replayed = (ou.RNG().getLocalSeed() for _ in range(MOST_SEEDS_REPLAYED))
-    n_used = next((i for i, seed in enumerate(replayed) if seed == following), None)
-    if n_used is None:
-        # What follows still depends only on the user's seed.
-        ou.RNG.setSeed(following)
-        return
-    ou.RNG.setSeed(first)
-    for _ in range(n_used):
-        ou.RNG()
-
-
-_silence = _Silence()
-
-
-def _renew_locks() -> None:
-    # A child that was forked while another thread held a lock would wait for that thread for ever.
-    _silence.lock = threading.Lock()
-    _BorrowedSeeds.lock = threading.Lock()
-
-
-os.register_at_fork(after_in_child=_renew_locks)

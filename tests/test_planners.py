@@ -210,7 +210,7 @@ def test_carried_parts_of_the_state_are_propagated():
     assert_sound(system, result, start, GOAL)
     way = np.linalg.norm(result.commands, axis=1).sum()
     assert result.reduced[-1, 2] == pytest.approx(2 + way)
-    with pytest.raises(ValueError, match="Odometer carries 1 more numbers along; use BiasedRRT"):
+    with pytest.raises(ValueError, match="that of Odometer holds 1 more numbers; use BiasedRRT"):
         BiasedRRTConnect(system).plan(start, GOAL)
 
 

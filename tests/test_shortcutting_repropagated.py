@@ -6,7 +6,9 @@ from toy_systems import Odometer
 
 from planners import BiasedRRT
 from planners.check_transition import CheckTransition
-from planners.shortcutting_repropagated import Path, RepropagatedShortcuts
+from planners.path import Path
+from planners.planning_problem import PlanningProblem
+from planners.shortcutting_repropagated import RepropagatedShortcuts
 from systems import Rope
 
 START, GOAL = np.array([-0.9, 0.0, 0.0]), np.array([0.9, 0.0])
@@ -105,9 +107,8 @@ def test_a_way_back_to_the_old_states_keeps_the_rest():
             state = system.propagate(state[None], commands[-1][None])[0][0]
     path = Path(np.array([*states, state]), np.array(commands))
     goals = corners[-1:]
-    shortcuts = RepropagatedShortcuts(
-        system, path.reduced[-1:, :2], check, np.random.default_rng(1)
-    )
+    problem = PlanningProblem(system, path.reduced[:1], path.reduced[-1:, :2])
+    shortcuts = RepropagatedShortcuts(problem, check, np.random.default_rng(1))
     shortened = shortcuts.shorten(path)
     assert_follows_g(system, shortened.reduced, shortened.commands)
     assert len(shortened.commands) < len(commands)
