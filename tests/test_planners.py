@@ -111,6 +111,39 @@ def test_shortcuts_let_no_unreliable_transition_in(planner, kind):
         assert shorter.n_accepted_unreliable == found.n_accepted_unreliable
 
 
+class SureFarOut:
+    """Calls every transition Reliable, and is sure of those that keep away from the disc."""
+
+    classes_ = np.array([0, 1])
+    validation_accuracy_ = 0.9
+
+    def predict(self, X):
+        return np.ones(len(X), dtype=int)
+
+    def predict_proba(self, X):
+        far_out = np.linalg.norm(X[:, :2], axis=1) > 0.65
+        reliable = np.where(far_out, 0.999, 0.6)
+        return np.column_stack([1 - reliable, reliable])
+
+
+@pytest.mark.parametrize(
+    ("planner", "system"),
+    [(BiasedRRTConnect, Disc()), (BiasedRRT, Disc()), (BiasedRRT, Odometer())],
+)
+def test_a_shortcut_is_as_likely_to_go_well_as_what_it_replaces(planner, system):
+    n_shorter = 0
+    for seed in range(8):
+        found, shortened = (
+            planner(system, SureFarOut(), simplify=simplify, random_state=seed).plan(
+                [*START, 0.0][: system.reduced_dim], GOAL
+            )
+            for simplify in (False, True)
+        )
+        assert shortened.success_probability >= found.success_probability * (1 - 1e-9)
+        n_shorter += len(shortened.commands) < len(found.commands)
+    assert n_shorter > 2
+
+
 @pytest.mark.parametrize("kind", [HalfPlane, FastHalfPlane])
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_infinite_k_plans_through_reliable_transitions_only(planner, kind):
@@ -197,13 +230,30 @@ def test_goals_that_are_distrusted_are_set_aside(planner):
         np.testing.assert_allclose(result.reduced[-1], goals[1])
 
 
+class LessAndLess:
+    """Calls every transition Unreliable, the more so the lower it starts."""
+
+    classes_ = np.array([0, 1])
+    validation_accuracy_ = 0.9
+
+    def predict(self, X):
+        return np.zeros(len(X), dtype=int)
+
+    def predict_proba(self, X):
+        reliable = 0.4 + 0.05 * X[:, 1]
+        return np.column_stack([1 - reliable, reliable])
+
+
 @pytest.mark.parametrize("planner", PLANNERS)
-def test_the_least_bad_goal_is_kept_when_all_are_distrusted(planner):
-    goals = np.array([[0.9, -0.5], [0.9, -0.6]])
-    assert planner(Disc(), HalfPlane(), random_state=0).plan([-0.9, 0.5], goals).success
+@pytest.mark.parametrize("order", [[0, 1, 2], [2, 0, 1], [1, 2, 0]])
+def test_the_least_bad_goal_is_kept_when_all_are_distrusted(planner, order):
+    goals = np.array([[0.9, -0.9], [0.9, 0.6], [0.9, -0.5]])
+    result = planner(Disc(), LessAndLess(), k=0.1, random_state=0).plan([-0.9, 0.5], goals[order])
+    assert result.success
+    np.testing.assert_allclose(result.reduced[-1], goals[1])
 
 
-def test_carried_parts_of_the_state_are_propagated():
+def test_the_rest_of_the_state_is_propagated():
     system = Odometer()
     start = np.array([*START, 2.0])
     result = BiasedRRT(system, HalfPlane3(), random_state=0).plan(start, GOAL)
