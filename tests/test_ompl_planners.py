@@ -1,6 +1,10 @@
 """The planners as OMPL's: the same plans through either door, and what OMPL asks of a planner."""
 
+import re
+import signal
 import sqlite3
+from pathlib import Path
+from subprocess import CalledProcessError
 
 import numpy as np
 import pytest
@@ -473,3 +477,32 @@ def test_nothing_of_ompl_is_left_behind():
     )
     assert process.stdout == "0\n"
     assert process.stderr == ""
+
+
+def test_the_documentations_example_runs(capsys):
+    text = (Path(__file__).parents[1] / "docs" / "ompl.md").read_text()
+    exec(compile(re.search(r"```python\n(.*?)```", text, flags=re.S)[1], "ompl.md", "exec"), {})
+    assert re.search(r"\d+ states\n\(\d+, 3\) 1.0\n\d+ vertices\n", capsys.readouterr().out)
+
+
+def test_what_ompl_cannot_do_from_python():
+    """If one of these fails, OMPL has learned something, and docs/ompl.md can be shorter."""
+    abort = """
+        from ompl import base as ob
+        from ompl import geometric as og
+        class Overriding(ob.Planner):
+            def getPlannerData(self, data):
+                print("called")
+        setup = og.SimpleSetup(ob.RealVectorStateSpace(1))
+        information = setup.getSpaceInformation()
+        setup.setPlanner(Overriding(information, "overriding"))
+        setup.getPlannerData(ob.PlannerData(information))
+        """
+    with pytest.raises(CalledProcessError) as caught:
+        run(abort)
+    assert caught.value.returncode == -signal.SIGABRT
+    assert "called" not in caught.value.output
+    planner = og.RRT(setup_of(Disc(), START, GOAL).getSpaceInformation())
+    for call in (planner.params, planner.getSpecs):
+        with pytest.raises(TypeError, match="Unable to convert function return value"):
+            call()
