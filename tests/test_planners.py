@@ -85,15 +85,16 @@ def rows_of(system, result):
     return {tuple(row) for row in system.features(result.reduced[:-1], result.reduced[1:])}
 
 
-@pytest.mark.parametrize("simplify", [True, False])
 @pytest.mark.parametrize("kind", [HalfPlane, FastHalfPlane])
 @pytest.mark.parametrize("planner", PLANNERS)
-def test_every_transition_was_classified_as_it_will_be_executed(planner, kind, simplify):
+def test_every_transition_was_classified_as_it_will_be_executed(planner, kind):
     for seed in range(8):
         estimator = kind()
-        result = planner(Disc(), estimator, simplify=simplify, random_state=seed).plan(START, GOAL)
-        asked = {tuple(row) for rows in estimator.asked for row in rows}
-        assert rows_of(Disc(), result) <= asked
+        result = planner(Disc(), estimator, simplify=False, random_state=seed).plan(START, GOAL)
+        # The last question is the report's, about the plan itself.
+        asked = np.concatenate(estimator.asked[:-1])
+        for row in rows_of(Disc(), result):
+            assert np.abs(asked - row).max(axis=1).min() < 1e-9
 
 
 @pytest.mark.parametrize("kind", [HalfPlane, FastHalfPlane])
@@ -266,6 +267,18 @@ def test_the_rest_of_the_state_is_propagated():
 
 class HalfPlane3(HalfPlane):
     """The same over the odometer's six features."""
+
+
+def test_commands_that_move_nothing_add_nothing():
+    class Sticky(Disc):
+        def propagate(self, reduced, command):
+            following, valid = super().propagate(reduced, command)
+            return np.where(reduced[:, :1] > 0.5, reduced, following), valid
+
+    result = BiasedRRT(Sticky(), max_iterations=200, random_state=0).plan(START, GOAL)
+    assert not result.success
+    assert (result.tree[:, 0] != result.tree[:, 1]).any(axis=1).all()
+    assert len(result.tree) > 100
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
