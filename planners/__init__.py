@@ -1,4 +1,4 @@
-"""Planners that distrust: biased RRT and RRT-Connect on OMPL, for any estimator."""
+"""Planners that avoid Unreliable transitions: biased RRT and RRT-Connect, for any estimator."""
 
 import lazy_loader
 

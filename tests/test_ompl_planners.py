@@ -322,7 +322,9 @@ def test_ompl_itself_gets_no_planner_data_and_does_not_abort():
     assert data.numVertices() == 0
 
 
-def test_a_benchmark_log_is_read_by_planner_arenas_tools(tmp_path):
+def test_a_benchmark_log_is_read_by_planner_arenas_tools(tmp_path, monkeypatch):
+    # OMPL writes the planners' messages into the current folder.
+    monkeypatch.chdir(tmp_path)
     setup = setup_of(Disc(), START, GOAL)
     benchmark = tools.Benchmark(setup, "disc")
     for planner in PLANNERS:

@@ -1,6 +1,7 @@
 """Both planners: sound plans, seeds, limits, and errors at the door."""
 
 import pickle
+import re
 
 import joblib
 import numpy as np
@@ -330,6 +331,42 @@ def test_results_are_saved_in_one_file(estimator, tmp_path):
     np.savez(path, format_version=np.array(7))
     with pytest.raises(ValueError, match="format version 7 and this library reads 1"):
         PlanResult.load(path)
+
+
+def test_a_seed_of_any_size_is_saved(tmp_path):
+    result = BiasedRRT(Disc(), random_state=2**200).plan(START, GOAL)
+    result.save(tmp_path / "plan.npz")
+    assert PlanResult.load(tmp_path / "plan.npz").random_state == 2**200
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("commands", lambda rows: rows * np.nan),
+        ("commands", lambda rows: rows[:-1]),
+        ("reduced", lambda rows: rows[:, 0]),
+        ("reliability", lambda rows: rows[1:]),
+    ],
+)
+def test_files_whose_arrays_do_not_go_together_are_refused(name, change, tmp_path):
+    path = tmp_path / "plan.npz"
+    BiasedRRT(Disc(), HalfPlane(), random_state=0).plan(START, GOAL).save(path)
+    arrays = dict(np.load(path))
+    np.savez(path, **arrays | {name: change(arrays[name])})
+    with pytest.raises(ValueError, match=r"plan.npz is not a whole file of a plan \("):
+        PlanResult.load(path)
+
+
+def test_a_result_prints_in_one_line():
+    text = repr(BiasedRRT(Disc(), HalfPlane(), random_state=0).plan(START, GOAL))
+    assert re.fullmatch(
+        r"PlanResult\(SOLVED, \d+ commands, success_probability=[\d.]+, random_state=0\)", text
+    )
+
+
+@pytest.mark.parametrize("limit", [np.float32(5), np.int64(5), 0.5])
+def test_numpys_numbers_are_time_limits(limit):
+    assert BiasedRRT(Disc(), time_limit=limit, random_state=0).plan(START, START).success
 
 
 @pytest.mark.parametrize(
