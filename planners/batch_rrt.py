@@ -1,36 +1,40 @@
-"""RRT with carried states, growing towards several samples at a time."""
+"""RRT that propagates whole reduced states and grows towards several samples at a time."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.budget import Budget
 from planners.check_transition import CheckTransition
-from planners.ompl_search import Clock
+from planners.path import Path
+from planners.planning_problem import PlanningProblem
 from planners.search_tree import SearchTree
 from systems.angles import shortest_way
-from systems.system import Array, System
+from systems.system import Array
 
 EXTENSIONS_PER_ROUND = 8
 GOAL_BIAS = 0.1
 # A share of the step: adding a displacement to a configuration rounds.
 ARRIVED = 1e-9
+# A straight extension takes at most as many steps as the bounds' diagonal has.
+LONGEST_EXTENSION = 10
 
 
 class BatchRRT:
-    """An RRT that extends a few branches at once, one transition each per question.
+    """An RRT with several extensions under way, which ask the estimator together.
 
-    A branch grows towards its sample until it arrives or a transition is rejected. Then another
-    sample takes its place; or else, for a tenth of the branches, a goal, from where it ended.
-    Growing towards goals from whichever state is nearest would fail again and again in one place.
+    An extension leads from a node of the tree towards a target. Each round adds one transition to
+    every extension; an extension ends when it reaches its target or a transition is rejected, and
+    another one takes its place. Most start at the node that is nearest to a random sample. A tenth
+    start where an extension towards a sample has just ended, and lead towards a goal: if they
+    started at the node nearest to the goal, they would fail again and again at the same place.
 
     Parameters
     ----------
-    system : System
-    start : ndarray of shape (reduced_dim,)
-    goals : ndarray of shape (n_goals, configuration_dim)
+    problem : PlanningProblem
     check : CheckTransition
     rng : Generator
 
@@ -40,100 +44,111 @@ class BatchRRT:
     """
 
     def __init__(
-        self,
-        system: System,
-        start: Array,
-        goals: Array,
-        check: CheckTransition,
-        rng: np.random.Generator,
+        self, problem: PlanningProblem, check: CheckTransition, rng: np.random.Generator
     ) -> None:
-        self.tree = SearchTree(start[None], system.configuration_dim, system.angular)
+        system = problem.system
+        self.tree = SearchTree(problem.starts, system.configuration_dim, system.angular)
         self._system = system
-        self._goals = goals
+        self._goals = problem.goals
         self._check = check
         self._rng = rng
-        self._commands: list[Array] = []
-        self._last = 0
-        self._goal_tried: set[int] = set()
+        # The command that led to each node; none does to a root, whose entry is never read.
+        configurations = problem.starts[:, : system.configuration_dim]
+        self._commands = [system.steer(problem.starts, configurations)]
+        self._tried_goal: set[int] = set()
+        diagonal = float(np.linalg.norm(system.bounds[1] - system.bounds[0]))
+        self._most_steps = int(LONGEST_EXTENSION * diagonal / system.step_size)
 
-    def __call__(self, clock: Clock) -> Array | None:
-        """Search until a state is a goal; return the configurations, None when time is up."""
-        found = bool(self._system.goal_reached(self.tree.reduced, self._goals)[0])
-        growing = _Branches(self._goals[:0], np.arange(0), np.zeros(0, dtype=np.bool_))
-        ended = growing.tips
-        while not found:
-            n_idle = EXTENSIONS_PER_ROUND - len(growing.tips)
-            if clock.spent(n_idle):
+    def grow(self, budget: Budget) -> Path | None:
+        """Grow the tree until a node is a goal; return the path to it, or None without one."""
+        at_goal = self._first_at_goal(np.arange(len(self.tree.reduced)))
+        none = np.arange(0)
+        extensions, ended = _Extensions(self._goals[:0], none, none == 0, none), none
+        while at_goal is None:
+            n_idle = EXTENSIONS_PER_ROUND - len(extensions.nodes)
+            if budget.exhausted(n_idle):
                 return None
-            found, growing, ended = self._step(growing.and_also(self._start(n_idle, ended)))
-        return self.path()[0][:, : self._system.configuration_dim]
+            extensions = _joined(extensions, self._started(n_idle, ended))
+            added, extensions, ended = self._extended(extensions)
+            at_goal = self._first_at_goal(added)
+        nodes = self.tree.path_from_root(at_goal)
+        return Path(self.tree.reduced[nodes], np.concatenate(self._commands)[nodes[1:]])
 
-    def path(self) -> tuple[Array, Array]:
-        """Return states and commands from the start to the goal, or the start alone."""
-        branch = self.tree.branch(self._last)
-        all_commands = np.concatenate([self._no_command(), *self._commands])
-        return self.tree.reduced[branch], all_commands[branch[1:] - 1]
+    def _first_at_goal(self, nodes: NDArray[np.int64]) -> int | None:
+        reached = self._system.goal_reached(self.tree.reduced[nodes], self._goals)
+        return int(nodes[np.argmax(reached)]) if reached.any() else None
 
-    def _no_command(self) -> Array:
-        start = self.tree.reduced[:1]
-        return self._system.steer(start, start[:, : self._system.configuration_dim])[:0]
-
-    def _start(self, n: int, ended: NDArray[np.int64]) -> _Branches:
-        """Start branches, some towards a goal from where others ended."""
-        fresh = np.array([tip for tip in ended if tip not in self._goal_tried], dtype=np.int64)
-        from_tips = fresh[self._rng.random(len(fresh)) < GOAL_BIAS]
-        self._goal_tried.update(from_tips.tolist())
-        goals = self._goals[self._rng.integers(len(self._goals), size=len(from_tips))]
-        samples = self._system.sample_configurations(self._rng, n - len(from_tips))
-        return _Branches(
-            np.concatenate([goals, samples]),
-            np.concatenate([from_tips, self.tree.nearest(samples)]),
-            np.arange(n) < len(from_tips),
+    def _started(self, n: int, ended: NDArray[np.int64]) -> _Extensions:
+        """Start extensions, some of them towards a goal from nodes where others have ended."""
+        fresh = np.array([node for node in ended if node not in self._tried_goal], dtype=np.int64)
+        to_goal = fresh[self._rng.random(len(fresh)) < GOAL_BIAS]
+        self._tried_goal.update(to_goal.tolist())
+        goals = self._goals[self._rng.integers(len(self._goals), size=len(to_goal))]
+        samples = self._system.sample_configurations(self._rng, n - len(to_goal))
+        return _Extensions(
+            targets=np.concatenate([goals, samples]),
+            nodes=np.concatenate([to_goal, self.tree.nearest(samples)]),
+            to_goal=np.arange(n) < len(to_goal),
+            n_steps=np.zeros(n, dtype=np.int64),
         )
 
-    def _step(self, growing: _Branches) -> tuple[bool, _Branches, NDArray[np.int64]]:
-        """Add one transition to each branch.
+    def _extended(
+        self, extensions: _Extensions
+    ) -> tuple[NDArray[np.int64], _Extensions, NDArray[np.int64]]:
+        """Add one transition to each extension.
 
-        Returns whether a goal is met, the branches that go on, and the tips of those that ended
-        on their way to a sample.
+        Returns
+        -------
+        added : ndarray of int
+            The new nodes.
+        going_on : _Extensions
+            The extensions that have neither reached their target nor been rejected.
+        ended : ndarray of int
+            The nodes at which extensions towards samples have ended.
         """
-        system, targets, tips = self._system, growing.targets, growing.tips
-        reduced = self.tree.reduced[tips]
+        system, targets, dim = self._system, extensions.targets, self._system.configuration_dim
+        reduced = self.tree.reduced[extensions.nodes]
         command = system.steer(reduced, targets)
         following, valid = system.propagate(reduced, command)
-        moved = following[:, : system.configuration_dim] != reduced[:, : system.configuration_dim]
-        possible = np.flatnonzero(valid & moved.any(axis=1))
+        moved = (following[:, :dim] != reduced[:, :dim]).any(axis=1)
+        possible = np.flatnonzero(valid & moved)
         accepted = possible[self._check(reduced[possible], following[possible])]
-        added = self.tree.add(following[accepted], tips[accepted])
+        added = self.tree.add(following[accepted], extensions.nodes[accepted])
         self._commands.append(command[accepted])
-        reached = system.goal_reached(following[accepted], self._goals)
-        if reached.any():
-            self._last = int(added[np.argmax(reached)])
-        configurations = following[accepted, : system.configuration_dim]
-        left = shortest_way(configurations, targets[accepted], system.angular)
-        going_on = np.zeros(len(tips), dtype=np.bool_)
-        going_on[accepted] = (np.abs(left) > ARRIVED * system.step_size).any(axis=1)
-        new_tips = tips.copy()
-        new_tips[accepted] = added
-        grown = _Branches(targets, new_tips, growing.to_goal)
-        ended = new_tips[~going_on & ~growing.to_goal]
-        return bool(reached.any()), grown.only(going_on), ended
+
+        nodes, n_steps = extensions.nodes.copy(), extensions.n_steps + 1
+        nodes[accepted] = added
+        left = shortest_way(following[accepted, :dim], targets[accepted], system.angular)
+        goes_on = np.zeros(len(nodes), dtype=np.bool_)
+        goes_on[accepted] = (np.abs(left) > ARRIVED * system.step_size).any(axis=1)
+        goes_on &= n_steps < self._most_steps
+        extended = extensions._replace(nodes=nodes, n_steps=n_steps)
+        return added, _selected(extended, goes_on), nodes[~goes_on & ~extensions.to_goal]
 
 
-@dataclass(frozen=True)
-class _Branches:
-    """Branches that grow: what towards, from which states, and whether towards a goal."""
+class _Extensions(NamedTuple):
+    """Extensions under way, one row each.
+
+    Attributes
+    ----------
+    targets : ndarray of shape (n, configuration_dim)
+    nodes : ndarray of int of shape (n,)
+        The node that each has got to.
+    to_goal : ndarray of bool of shape (n,)
+        Whether the target is a goal.
+    n_steps : ndarray of int of shape (n,)
+        Transitions taken so far. A ``steer`` that never arrives must not extend for ever.
+    """
 
     targets: Array
-    tips: NDArray[np.int64]
+    nodes: NDArray[np.int64]
     to_goal: NDArray[np.bool_]
+    n_steps: NDArray[np.int64]
 
-    def only(self, which: NDArray[np.bool_]) -> _Branches:
-        return _Branches(self.targets[which], self.tips[which], self.to_goal[which])
 
-    def and_also(self, others: _Branches) -> _Branches:
-        return _Branches(
-            np.concatenate([self.targets, others.targets]),
-            np.concatenate([self.tips, others.tips]),
-            np.concatenate([self.to_goal, others.to_goal]),
-        )
+def _selected(extensions: _Extensions, rows: NDArray[np.bool_]) -> _Extensions:
+    return _Extensions._make(column[rows] for column in extensions)
+
+
+def _joined(one: _Extensions, other: _Extensions) -> _Extensions:
+    return _Extensions._make(np.concatenate(columns) for columns in zip(one, other, strict=True))

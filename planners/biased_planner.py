@@ -1,92 +1,86 @@
-"""What the biased planners share: arguments, goals, and the making of results."""
+"""What the biased planners share: parameters, and the way from a problem to a result."""
 
 from __future__ import annotations
 
 import time
 from abc import abstractmethod
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import KW_ONLY, dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 from threadpoolctl import threadpool_limits
 
+from planners.budget import Budget, never
 from planners.check_transition import CheckTransition
-from planners.ompl_search import Budget
+from planners.edge_checker import EdgeChecker
+from planners.path import Path
+from planners.planning_problem import PlanningProblem
 from planners.result import PlanResult, PlanStatus
+from planners.shortcutting import shorten
+from planners.shortcutting_repropagated import RepropagatedShortcuts
 from systems.system import Array, System
-from systems.validation import (
-    RandomState,
-    as_finite_array,
-    as_seed,
-    check_count,
-    check_within_bounds,
-)
+from systems.validation import RandomState, as_seed, check_count
 
 
-@dataclass(frozen=True)
-class Found:
-    """What a search came to.
+class Search(NamedTuple):
+    """Everything that a search needs.
 
     Attributes
     ----------
-    status : PlanStatus
-    reduced : ndarray of shape (T + 1, reduced_dim)
-    commands : ndarray of shape (T, command_dim)
-    tree : ndarray of shape (n_edges, 2, configuration_dim)
-    simplification_time : float
-        Seconds of the search's duration that went into making the plan shorter.
-    """
-
-    status: PlanStatus
-    reduced: Array
-    commands: Array
-    tree: Array
-    simplification_time: float
-
-
-@dataclass(frozen=True)
-class Search:
-    """One planning problem with what a search needs to solve it.
-
-    Attributes
-    ----------
-    start : ndarray of shape (reduced_dim,)
-    goals : ndarray of shape (n_goals, configuration_dim)
+    problem : PlanningProblem
     check : CheckTransition
     budget : Budget
     rng : Generator
     ompl_seed : int
+        Seed for OMPL's random numbers, positive.
     """
 
-    start: Array
-    goals: Array
+    problem: PlanningProblem
     check: CheckTransition
     budget: Budget
     rng: np.random.Generator
     ompl_seed: int
 
 
+class Found(NamedTuple):
+    """What a search found.
+
+    Attributes
+    ----------
+    path : Path or None
+        From a start to a goal; None if the budget was exhausted first.
+    tree : ndarray of shape (n_edges, 2, configuration_dim)
+        Configurations at the ends of all accepted edges, in the direction of execution.
+    """
+
+    path: Path | None
+    tree: Array
+
+
+@dataclass(eq=False, repr=False)
 class BiasedPlanner(BaseEstimator):
-    """Base of the biased planners; parameters are those of the planners.
+    """Base of the biased planners, which document the parameters.
 
     Constructors only store; :meth:`plan` validates.
     """
 
     system: System
-    estimator: Any
-    k: float
-    accuracy: float | None
-    simplify: bool
-    max_iterations: int
-    time_limit: float | None
-    random_state: RandomState
+    estimator: Any = None
+    _: KW_ONLY
+    k: float = 1.0
+    accuracy: float | None = None
+    simplify: bool = True
+    max_iterations: int = 20_000
+    time_limit: float | None = None
+    random_state: RandomState = None
 
     @abstractmethod
     def _search(self, search: Search) -> Found:
-        """Solve a problem that has been checked."""
+        """Look for a path from a start to a goal."""
 
     def plan(self, start_reduced: ArrayLike, goal: ArrayLike) -> PlanResult:
         """Plan from a reduced state to a goal.
@@ -95,8 +89,9 @@ class BiasedPlanner(BaseEstimator):
         ----------
         start_reduced : ndarray of shape (reduced_dim,)
         goal : ndarray of shape (n_goals, configuration_dim) or (configuration_dim,)
-            Configurations, any of which will do. Goals at which the estimator distrusts even
-            standing still are set aside; if it distrusts all, the most reliable one is kept.
+            Configurations, any of which will do. Goals at which the estimator calls even
+            standing still Unreliable are left out; if it does so at all of them, the one that is
+            most probably Reliable is kept.
 
         Returns
         -------
@@ -109,29 +104,123 @@ class BiasedPlanner(BaseEstimator):
         sklearn.exceptions.NotFittedError
             If the estimator is not fitted.
         """
+        return self.plan_from_any([start_reduced], goal)
+
+    def plan_from_any(
+        self,
+        starts_reduced: Sequence[ArrayLike],
+        goal: ArrayLike,
+        terminated: Callable[[], bool] = never,
+    ) -> PlanResult:
+        """Plan from any of several reduced states, until told to stop.
+
+        Parameters
+        ----------
+        starts_reduced : sequence of ndarray of shape (reduced_dim,)
+        goal : ndarray of shape (n_goals, configuration_dim) or (configuration_dim,)
+            As in :meth:`plan`.
+        terminated : callable, default=never
+            Asked before each round of the search, which stops when the answer is True.
+
+        Returns
+        -------
+        PlanResult
+        """
         began = time.perf_counter()
         self._check_parameters()
         seed = as_seed(self.random_state)
+        search = self._build(seed, starts_reduced, goal, terminated)
+        with _one_thread(search.check):
+            found = self._search(search)
+            searched = time.perf_counter()
+            path = self._shortened(found, search)
+        times = searched - began, time.perf_counter() - searched
+        return self._report(search, found, path, times, seed)
+
+    def ompl_planner(self, space_information: Any, start_reduced: ArrayLike | None = None) -> Any:
+        """Make an OMPL planner of this one, for a problem that is set up in OMPL.
+
+        It reads this planner's parameters whenever it solves, and returns the path of
+        :meth:`plan`. See ``docs/ompl.md``.
+
+        Parameters
+        ----------
+        space_information : ompl.base.SpaceInformation
+            Of a state space whose numbers are the system's configuration.
+        start_reduced : ndarray of shape (reduced_dim,), default=None
+            The reduced state at OMPL's start state. Needed where a reduced state is more than a
+            configuration, as the rope's is.
+
+        Returns
+        -------
+        planners.ompl_planner.OmplPlanner
+            An ``ompl.base.Planner``.
+
+        Raises
+        ------
+        ValueError
+            If the state space doesn't fit the system, or ``start_reduced`` is missing or unfit.
+        """
+        from planners.ompl_planner import OmplPlanner
+
+        self._check_parameters()
+        return OmplPlanner(space_information, self, start_reduced)
+
+    def _check_parameters(self) -> None:
+        if not isinstance(self.system, System):
+            raise ValueError(f"system must be a System, got {self.system!r}.")
+        check_count(self.max_iterations, "max_iterations")
+        limit = self.time_limit
+        is_number = isinstance(limit, int | float | np.number) and not isinstance(limit, bool)
+        if limit is not None and not (is_number and limit > 0):
+            raise ValueError(f"time_limit must be None or positive seconds, got {limit!r}.")
+
+    def _build(
+        self,
+        seed: int,
+        starts: Sequence[ArrayLike],
+        goal: ArrayLike,
+        terminated: Callable[[], bool],
+    ) -> Search:
         for_search, for_ompl = np.random.SeedSequence(seed).spawn(2)
         rng = np.random.default_rng(for_search)
         check = CheckTransition(
             self.system, self.estimator, k=self.k, accuracy=self.accuracy, rng=rng
         )
-        start = self._checked_start(start_reduced)
-        goals = self._trusted_goals(self._checked_goals(goal), check)
+        problem = PlanningProblem.checked(self.system, starts, goal).with_trusted_goals(check)
+        budget = Budget(int(self.max_iterations), self.time_limit, terminated)
         # OMPL ignores a seed of zero.
-        ompl_seed = 1 + int(for_ompl.generate_state(1)[0])
-        budget = Budget(int(self.max_iterations), self.time_limit)
-        with _one_thread(check):
-            found = self._search(Search(start, goals, check, budget, rng, ompl_seed))
-        duration = time.perf_counter() - began
+        return Search(problem, check, budget, rng, 1 + int(for_ompl.generate_state(1)[0]))
+
+    def _shortened(self, found: Found, search: Search) -> Path | None:
+        if found.path is None or not self.simplify:
+            return found.path
+        problem, check, rng = search.problem, search.check, search.rng
+        if self.system.configuration_dim < self.system.reduced_dim:
+            return RepropagatedShortcuts(problem, check, rng).shorten(found.path)
+        checker = EdgeChecker(self.system, check)
+        reduced = shorten(found.path.reduced, checker, self.system, rng)
+        return Path(reduced, self.system.steer(reduced[:-1], reduced[1:]))
+
+    def _report(
+        self,
+        search: Search,
+        found: Found,
+        path: Path | None,
+        times: tuple[float, float],
+        seed: int,
+    ) -> PlanResult:
+        check = search.check
+        solved = path is not None
+        reduced, commands = path or _standing(search.problem)
+        no_estimator = self.estimator is None
         return PlanResult(
-            reduced=found.reduced,
-            commands=found.commands,
-            status=found.status,
-            reliability=self._reliability(found, check),
-            planning_time=duration - found.simplification_time,
-            simplification_time=found.simplification_time,
+            reduced=reduced,
+            commands=commands,
+            status=PlanStatus.SOLVED if solved else search.budget.limit,
+            reliability=None if no_estimator else check.probability(reduced[:-1], reduced[1:]),
+            planning_time=times[0],
+            simplification_time=times[1],
             n_checked=check.n_checked,
             n_rejected=check.n_rejected,
             n_accepted_unreliable=check.n_accepted_unreliable,
@@ -139,59 +228,14 @@ class BiasedPlanner(BaseEstimator):
             random_state=seed,
         )
 
-    def _reliability(self, found: Found, check: CheckTransition) -> Array | None:
-        if self.estimator is None:
-            return None
-        return check.probability(found.reduced[:-1], found.reduced[1:])
 
-    def _check_parameters(self) -> None:
-        if not isinstance(self.system, System):
-            raise ValueError(f"system must be a System, got {self.system!r}.")
-        check_count(self.max_iterations, "max_iterations")
-        limit = self.time_limit
-        if limit is not None and not (isinstance(limit, int | float) and limit > 0):
-            raise ValueError(f"time_limit must be None or positive seconds, got {limit!r}.")
-
-    def _checked_start(self, start_reduced: ArrayLike) -> Array:
-        start = as_finite_array(start_reduced, "start_reduced", (self.system.reduced_dim,))
-        configuration = start[: self.system.configuration_dim]
-        check_within_bounds(configuration, self.system.bounds, "start_reduced")
-        if not self._can_stay(start[None])[0]:
-            raise ValueError(
-                f"start_reduced must be a state from which propagate is valid, got {start}."
-            )
-        return start
-
-    def _checked_goals(self, goal: ArrayLike) -> Array:
-        dim = self.system.configuration_dim
-        goals = as_finite_array(np.atleast_2d(goal), "goal", (None, dim))
-        if len(goals) == 0:
-            raise ValueError("goal must hold at least one configuration, got none.")
-        check_within_bounds(goals, self.system.bounds, "goal")
-        if dim < self.system.reduced_dim:
-            return goals
-        possible = self._can_stay(goals)
-        if not possible.any():
-            raise ValueError(
-                f"goal must hold a configuration that can be reached: propagate is not valid at "
-                f"any of the {len(goals)}, such as {goals[0]}."
-            )
-        return goals[possible]
-
-    def _can_stay(self, reduced: Array) -> NDArray[np.bool_]:
-        """Say, row by row, whether g allows the transition that goes nowhere."""
-        command = self.system.steer(reduced, reduced[:, : self.system.configuration_dim])
-        return self.system.propagate(reduced, command)[1]
-
-    def _trusted_goals(self, goals: Array, check: CheckTransition) -> Array:
-        if len(goals) == 1 or self.estimator is None or goals.shape[1] < self.system.reduced_dim:
-            return goals
-        trusted = check.classify(goals, goals)
-        if trusted.any():
-            return goals[trusted]
-        return goals[[int(np.argmax(check.probability(goals, goals)))]]
+def _standing(problem: PlanningProblem) -> Path:
+    """Return the path that stays at the first start: one state and no command."""
+    start = problem.starts[:1]
+    configuration = start[:, : problem.system.configuration_dim]
+    return Path(start, problem.system.steer(start, configuration)[:0])
 
 
 def _one_thread(check: CheckTransition) -> AbstractContextManager[Any]:
-    """Keep an estimator from sharing out its rows: of a few, threads mostly wait."""
+    """Keep an estimator from sharing few rows among threads, which then mostly wait."""
     return nullcontext() if check.answers_fast else threadpool_limits(1, user_api="openmp")

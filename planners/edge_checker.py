@@ -11,7 +11,7 @@ from systems.system import Array, System
 
 
 class EdgeChecker:
-    """Decides about straight edges of a system whose reduced state is only a configuration.
+    """Checks straight edges of a system whose reduced state is only a configuration.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class EdgeChecker:
         self._accepted: list[tuple[Array, Array, NDArray[np.bool_]]] = []
 
     def accept(self, starts: Array, ends: Array) -> NDArray[np.bool_]:
-        """Accept edges of which g allows and CheckTransition accepts every transition.
+        """Accept the edges of which g allows, and CheckTransition accepts, every transition.
 
         Parameters
         ----------
@@ -48,20 +48,26 @@ class EdgeChecker:
         return np.concatenate([np.empty((0, 2, self._system.reduced_dim)), *edges])
 
     def evaluate(self, starts: Array, ends: Array) -> tuple[NDArray[np.bool_], Array]:
-        """Judge edges without any draws.
+        """Classify edges without any random acceptance.
+
+        Parameters
+        ----------
+        starts, ends : ndarray of shape (n_edges, configuration_dim)
+            To be executed from start to end.
 
         Returns
         -------
         reliable : ndarray of bool of shape (n_edges,)
-            Whether every transition of the edge is classified Reliable.
-        doubt : ndarray of shape (n_edges,)
-            The edge's part in -log of the probability that all goes well.
+            Whether g allows every transition of the edge, and each is classified Reliable.
+        cost : ndarray of shape (n_edges,)
+            Negative log-likelihood: -log of the probability that all of the edge's transitions
+            are Reliable.
         """
         possible, origins, following, edge = self._propagate(starts, ends)
         reliable, probability = self._check.evaluate(origins, following)
-        doubt = np.zeros(len(starts))
-        np.add.at(doubt, edge, negative_log_likelihood(probability))
-        return _all_per_edge(possible, edge, reliable), doubt
+        cost = np.zeros(len(starts))
+        np.add.at(cost, edge, negative_log_likelihood(probability))
+        return _all_per_edge(possible, edge, reliable), cost
 
     def negative_log_likelihood(self, reduced: Array, next_reduced: Array) -> Array:
         """Return -log of the probability that each transition is Reliable, shape (n,)."""
@@ -70,7 +76,15 @@ class EdgeChecker:
     def _propagate(
         self, starts: Array, ends: Array
     ) -> tuple[NDArray[np.bool_], Array, Array, NDArray[np.int64]]:
-        """Return which edges g allows, and those edges' transitions."""
+        """Return which edges g allows, and the transitions of those edges.
+
+        Returns
+        -------
+        possible : ndarray of bool of shape (n_edges,)
+        origins, following : ndarray of shape (n_transitions, configuration_dim)
+        edge : ndarray of int of shape (n_transitions,)
+            The edge that each transition belongs to.
+        """
         system = self._system
         origins, targets, edge = split_edges(starts, ends, system.step_size, system.angular)
         command = system.steer(origins, targets)
@@ -86,6 +100,7 @@ class EdgeChecker:
 def _all_per_edge(
     possible: NDArray[np.bool_], edge: NDArray[np.int64], accepted: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
+    """Return which possible edges have all of their transitions accepted."""
     if not accepted.all():
         possible[edge[~accepted]] = False
     return possible

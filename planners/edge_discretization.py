@@ -79,7 +79,7 @@ def _split_turning(
         for i in angular:
             origins[row, i] = wrap_angle(origins[row, i])
             targets[row, i] = wrap_angle(targets[row, i])
-        # Rounding must not part an edge's end from the vertex that it leads to.
+        # Despite rounding, an edge must end exactly at its vertex.
         if row + 1 == edge.shape[0] or edge[row + 1] != edge[row]:
             targets[row] = ends[edge[row]]
     return origins, targets, edge

@@ -26,18 +26,19 @@ def best_of_restarts(
     enough: float = 1.0,
     score: Callable[[PlanResult], float] = lambda plan: plan.success_probability,
 ) -> PlanResult:
-    """Plan until a plan is likely enough to go well, and keep the likeliest.
+    """Plan again until a plan's score is high enough, and keep the plan of the highest score.
 
     Parameters
     ----------
     attempt : callable
-        Plans for the 0th, 1st, 2nd... time; with another seed each time, say.
+        Called with 0, 1, 2, ...; plans, with another seed at each call, say.
     n_plans : int
         Plans to make at most.
     enough : float, default=1.0
-        A plan of this score is kept without looking for a better one.
+        No more plans are made after one of at least this score.
     score : callable, default=the plan's ``success_probability``
-        Never asked about a failure: that is worse than any plan.
+        Only called with plans that reach the goal: a failure is worse than any of them. A plan
+        whose score is NaN counts as a failure.
 
     Returns
     -------
@@ -52,10 +53,11 @@ def best_of_restarts(
     check_count(n_plans, "n_plans")
     check_number(enough, "enough", -np.inf, np.inf)
     plans: list[PlanResult] = []
-    merits: list[float] = []
-    while not plans or (len(plans) < n_plans and max(merits) < enough):
+    scores: list[float] = []
+    while not plans or (len(plans) < n_plans and max(scores) < enough):
         plan = attempt(len(plans))
         plans.append(plan)
-        merits.append(score(plan) if plan.success else -np.inf)
+        scored = score(plan) if plan.success else np.nan
+        scores.append(-np.inf if np.isnan(scored) else scored)
     costs = {name: sum(getattr(plan, name) for plan in plans) for name in _COSTS}
-    return replace(plans[int(np.argmax(merits))], **costs)
+    return replace(plans[int(np.argmax(scores))], **costs)

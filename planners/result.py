@@ -28,6 +28,10 @@ class PlanStatus(Enum):
         "No plan was found within time_limit. Raise time_limit, or lower k so that more "
         "Unreliable transitions are accepted."
     )
+    TERMINATED = (
+        "No plan was found before OMPL's termination condition became true. Allow the planner "
+        "more time, or lower k so that more Unreliable transitions are accepted."
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +92,8 @@ class PlanResult:
         """Write one npz file."""
         values: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
         values["status"] = self.status.name
+        # As text, since a seed may be larger than any of numpy's integers.
+        values["random_state"] = str(self.random_state)
         if self.reliability is None:
             del values["reliability"]
         write_arrays(path, values, format_version=FORMAT_VERSION)
@@ -103,8 +109,32 @@ class PlanResult:
         """
         names = {field.name for field in fields(cls)} - {"reliability"}
         arrays = read_arrays(path, names, format_version=FORMAT_VERSION, kind="a plan")
+        _check_arrays(path, arrays)
         values: dict[str, Any] = {"reliability": None} | arrays
         for name in names - {"reduced", "commands", "tree"}:
             values[name] = arrays[name].item()
         values["status"] = PlanStatus[values["status"]]
+        values["random_state"] = int(values["random_state"])
         return cls(**values)
+
+    def __repr__(self) -> str:
+        return (
+            f"PlanResult({self.status.name}, {len(self.commands)} commands, "
+            f"success_probability={self.success_probability:.3g}, "
+            f"random_state={self.random_state})"
+        )
+
+
+def _check_arrays(path: str | os.PathLike[str], arrays: dict[str, NDArray[Any]]) -> None:
+    """Raise ``ValueError`` unless arrays are those of one plan."""
+    n = len(arrays["commands"])
+    expected = {"reduced": (n + 1, 2), "commands": (n, 2), "tree": (len(arrays["tree"]), 3)}
+    if "reliability" in arrays:
+        expected["reliability"] = (n, 1)
+    for name, (length, ndim) in expected.items():
+        array = arrays[name]
+        if array.ndim != ndim or len(array) != length or not np.isfinite(array).all():
+            raise ValueError(
+                f"{path} is not a whole file of a plan ({name}, of the shape {array.shape}, holds "
+                f"NaN or doesn't go with {n} commands)."
+            )

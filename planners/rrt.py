@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-import time
-from typing import Any
-
 from planners.batch_rrt import BatchRRT
 from planners.biased_planner import BiasedPlanner, Found, Search
-from planners.edge_checker import EdgeChecker
-from planners.ompl_search import search_as_planner
-from planners.result import PlanStatus
-from planners.shortcutting import shorten
-from planners.shortcutting_repropagated import Path, RepropagatedShortcuts
-from systems.system import Array, System
-from systems.validation import RandomState
 
 
 class BiasedRRT(BiasedPlanner):
-    """RRT that is biased away from transitions that an estimator distrusts.
+    """RRT that is biased away from transitions that an estimator calls Unreliable.
 
-    For every system: whatever a reduced state carries besides its configuration is propagated
-    along the tree. Branches grow towards several samples at a time, one transition each per
-    question to the estimator, until they arrive or a transition is rejected.
+    For every system: whatever a reduced state holds besides its configuration is propagated along
+    the tree. The tree grows towards several samples at a time, by one transition each per question
+    to the estimator, until a sample is reached or a transition is rejected.
 
     Parameters
     ----------
@@ -53,54 +43,7 @@ class BiasedRRT(BiasedPlanner):
     True
     """
 
-    def __init__(
-        self,
-        system: System,
-        estimator: Any = None,
-        *,
-        k: float = 1.0,
-        accuracy: float | None = None,
-        simplify: bool = True,
-        max_iterations: int = 20_000,
-        time_limit: float | None = None,
-        random_state: RandomState = None,
-    ) -> None:
-        self.system = system
-        self.estimator = estimator
-        self.k = k
-        self.accuracy = accuracy
-        self.simplify = simplify
-        self.max_iterations = max_iterations
-        self.time_limit = time_limit
-        self.random_state = random_state
-
     def _search(self, search: Search) -> Found:
-        rrt = BatchRRT(self.system, search.start, search.goals, search.check, search.rng)
-        status, _ = search_as_planner(
-            self.system.bounds,
-            search.start[: self.system.configuration_dim],
-            search.goals,
-            rrt,
-            budget=search.budget,
-            seed=search.ompl_seed,
-        )
-        began = time.perf_counter()
-        path, commands = rrt.path()
-        if self.simplify and status is PlanStatus.SOLVED:
-            path, commands = self._shortened(path, commands, search)
-        return Found(
-            status=status,
-            reduced=path,
-            commands=commands,
-            tree=rrt.tree.edges(),
-            simplification_time=time.perf_counter() - began,
-        )
-
-    def _shortened(self, path: Array, commands: Array, search: Search) -> tuple[Array, Array]:
-        if self.system.configuration_dim < self.system.reduced_dim:
-            shortcuts = RepropagatedShortcuts(self.system, search.goals, search.check, search.rng)
-            shortened = shortcuts.shorten(Path(path, commands))
-            return shortened.reduced, shortened.commands
-        checker = EdgeChecker(self.system, search.check)
-        shorter = shorten(path, checker, self.system, search.rng)
-        return shorter, self.system.steer(shorter[:-1], shorter[1:])
+        rrt = BatchRRT(search.problem, search.check, search.rng)
+        path = rrt.grow(search.budget)
+        return Found(path, rrt.tree.edges())

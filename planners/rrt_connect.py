@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from typing import Any
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
@@ -11,15 +10,15 @@ from planners.batch_rrt_connect import BatchRRTConnect
 from planners.biased_planner import BiasedPlanner, Found, Search
 from planners.edge_checker import EdgeChecker
 from planners.edge_discretization import split_edges
-from planners.ompl_search import rrt_connect, search_as_planner
-from planners.result import PlanStatus
-from planners.shortcutting import shorten
-from systems.system import Array, System
-from systems.validation import RandomState, check_count
+from planners.ompl_backend import ompl_rrt_connect
+from planners.path import Path
+from systems.system import Array
+from systems.validation import check_count
 
 
+@dataclass(eq=False, repr=False)
 class BiasedRRTConnect(BiasedPlanner):
-    """RRT-Connect that is biased away from transitions that an estimator distrusts.
+    """RRT-Connect that is biased away from transitions that an estimator calls Unreliable.
 
     For systems whose reduced state is only a configuration, and which can be steered exactly from
     one configuration to another. OMPL's own RRT-Connect searches when the estimator answers
@@ -60,76 +59,37 @@ class BiasedRRTConnect(BiasedPlanner):
     True
     """
 
-    def __init__(
-        self,
-        system: System,
-        estimator: Any = None,
-        *,
-        k: float = 1.0,
-        accuracy: float | None = None,
-        transitions_per_edge: int = 5,
-        simplify: bool = True,
-        max_iterations: int = 20_000,
-        time_limit: float | None = None,
-        random_state: RandomState = None,
-    ) -> None:
-        self.system = system
-        self.estimator = estimator
-        self.k = k
-        self.accuracy = accuracy
-        self.transitions_per_edge = transitions_per_edge
-        self.simplify = simplify
-        self.max_iterations = max_iterations
-        self.time_limit = time_limit
-        self.random_state = random_state
+    _: KW_ONLY
+    transitions_per_edge: int = 5
 
     def _check_parameters(self) -> None:
         super()._check_parameters()
         check_count(self.transitions_per_edge, "transitions_per_edge")
-        if self.system.configuration_dim != self.system.reduced_dim:
+        extra = self.system.reduced_dim - self.system.configuration_dim
+        if extra:
             raise ValueError(
-                "BiasedRRTConnect needs a system whose reduced state is only a configuration, "
-                f"and {type(self.system).__name__} carries "
-                f"{self.system.reduced_dim - self.system.configuration_dim} more numbers along; "
-                "use BiasedRRT."
+                "BiasedRRTConnect needs a system whose reduced state is only a configuration, and "
+                f"that of {type(self.system).__name__} holds {extra} more numbers; use BiasedRRT."
             )
 
     def _search(self, search: Search) -> Found:
         checker = EdgeChecker(self.system, search.check)
-        status, vertices = self._vertices(search, checker)
-        if vertices is None:
-            path, simplification_time = search.start[None], 0.0
-        else:
-            path = _transition_states(vertices, self.system)
-            began = time.perf_counter()
-            if self.simplify:
-                path = shorten(path, checker, self.system, search.rng)
-            simplification_time = time.perf_counter() - began
-        return Found(
-            status=status,
-            reduced=path,
-            commands=self.system.steer(path[:-1], path[1:]),
-            tree=checker.accepted_edges(),
-            simplification_time=simplification_time,
-        )
+        vertices = self._vertices(search, checker)
+        path = None if vertices is None else self._path_along(vertices)
+        return Found(path, checker.accepted_edges())
 
-    def _vertices(self, search: Search, checker: EdgeChecker) -> tuple[PlanStatus, Array | None]:
-        problem = (self.system.bounds, search.start, search.goals)
+    def _vertices(self, search: Search, checker: EdgeChecker) -> Array | None:
+        problem, budget = search.problem, search.budget
         longest_edge = self.transitions_per_edge * self.system.step_size
         # OMPL adds up the distances of a compound space where we want the Euclidean one.
         if search.check.answers_fast and not self.system.angular:
-            return rrt_connect(
-                *problem,
-                checker,
-                longest_edge=longest_edge,
-                budget=search.budget,
-                seed=search.ompl_seed,
-            )
-        batch = BatchRRTConnect(*problem, checker, longest_edge, self.system.angular, search.rng)
-        return search_as_planner(*problem, batch, budget=search.budget, seed=search.ompl_seed)
+            return ompl_rrt_connect(problem, checker, longest_edge, budget, search.ompl_seed)
+        return BatchRRTConnect(problem, checker, longest_edge, search.rng).grow(budget)
 
-
-def _transition_states(vertices: Array, system: System) -> Array:
-    """Return the states along a path's edges, cut as they were when they were checked."""
-    origins, targets, _ = split_edges(vertices[:-1], vertices[1:], system.step_size, system.angular)
-    return np.concatenate([origins[:1], targets])
+    def _path_along(self, vertices: Array) -> Path:
+        """Return the path along edges, cut into transitions as when the edges were checked."""
+        origins, targets, _ = split_edges(
+            vertices[:-1], vertices[1:], self.system.step_size, self.system.angular
+        )
+        reduced = np.concatenate([origins[:1], targets])
+        return Path(reduced, self.system.steer(reduced[:-1], reduced[1:]))

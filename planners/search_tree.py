@@ -28,7 +28,8 @@ class SearchTree:
         self._dim = configuration_dim
         self._wraps = np.isin(np.arange(configuration_dim), angular)
         self._reduced = np.array(roots)
-        # A copy side by side: whole states lie too far apart in memory to be searched through.
+        # A copy of the columns that distances need: searching whole states would read memory that
+        # is mostly of no use.
         self._configurations = np.array(roots[:, :configuration_dim])
         self._parents = np.full(len(roots), -1)
         self._size = len(roots)
@@ -66,8 +67,8 @@ class SearchTree:
             )
         return nearest_rows(self._configurations, self._size, self._dim, configurations)
 
-    def branch(self, index: int) -> NDArray[np.int64]:
-        """Return the indices from a root to a state."""
+    def path_from_root(self, index: int) -> NDArray[np.int64]:
+        """Return the indices of the states from a root to a state, both included."""
         indices = []
         while index >= 0:
             indices.append(index)

@@ -1,4 +1,4 @@
-"""Shortcuts that keep a plan as reliable as it was found."""
+"""Shortcuts for plans whose reduced states are only configurations."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ SMALLEST_SAVING = 1e-6
 def shorten(path: Array, checker: EdgeChecker, system: System, rng: np.random.Generator) -> Array:
     """Replace parts of a path by straight lines that are at least as reliable.
 
-    Every transition of a shortcut must be classified Reliable, in the direction in which it will
-    be executed, and together they must be as likely to go well as those they replace. Nothing is
-    drawn: a shortcut that is tried until a draw lets it pass would undo the bias. So every
-    transition of the result was either accepted in the search or is classified Reliable.
+    Every transition of a shortcut must be classified Reliable in the direction in which it will
+    be executed, and all of them together must be as likely to be Reliable as those they replace.
+    No Unreliable transition is accepted at random here: a shortcut that is tried until it happens
+    to be accepted would undo the bias. So every transition of the result was either accepted in
+    the search or is classified Reliable.
 
     Parameters
     ----------
@@ -34,29 +35,24 @@ def shorten(path: Array, checker: EdgeChecker, system: System, rng: np.random.Ge
     -------
     shortened : ndarray of shape (S + 1, configuration_dim), S <= T
     """
-    negative_log_likelihood = checker.negative_log_likelihood(path[:-1], path[1:])
+    costs = checker.negative_log_likelihood(path[:-1], path[1:])
     for _ in range(ROUNDS):
         if len(path) <= 2:
             break
         first, last, saving = _propose(path, system.angular, rng)
         if len(first) == 0:
             continue
-        reliable, doubt = checker.evaluate(path[first], path[last])
-        so_far = np.concatenate([[0.0], np.cumsum(negative_log_likelihood)])
-        saving[~reliable | (doubt > so_far[last] - so_far[first])] = 0
+        reliable, cost = checker.evaluate(path[first], path[last])
+        cost_before = np.concatenate([[0.0], np.cumsum(costs)])
+        saving[~reliable | (cost > cost_before[last] - cost_before[first])] = 0
         best = int(np.argmax(saving))
         if saving[best] > 0:
             start, end = first[best], last[best]
             origins, straight, _ = split_edges(
                 path[start][None], path[end][None], system.step_size, system.angular
             )
-            negative_log_likelihood = np.concatenate(
-                [
-                    negative_log_likelihood[:start],
-                    checker.negative_log_likelihood(origins, straight),
-                    negative_log_likelihood[end:],
-                ]
-            )
+            new_costs = checker.negative_log_likelihood(origins, straight)
+            costs = np.concatenate([costs[:start], new_costs, costs[end:]])
             path = np.concatenate([path[: start + 1], straight, path[end + 1 :]])
     return path
 
@@ -64,7 +60,14 @@ def shorten(path: Array, checker: EdgeChecker, system: System, rng: np.random.Ge
 def _propose(
     path: Array, angular: tuple[int, ...], rng: np.random.Generator
 ) -> tuple[Array, Array, Array]:
-    """Draw pairs of states with a detour between them, and the length that each would save."""
+    """Draw pairs of states of which the path between them is longer than a straight line.
+
+    Returns
+    -------
+    first, last : ndarray of int of shape (n,)
+    saving : ndarray of shape (n,)
+        Length that a straight line between the two would save.
+    """
     pairs = np.sort(rng.integers(len(path), size=(PROPOSALS_PER_ROUND, 2)), axis=1)
     pairs[0] = 0, len(path) - 1
     first, last = pairs.T

@@ -1,18 +1,21 @@
-"""Shortcuts for plans whose reduced states carry more than their configuration.
+"""Shortcuts for plans whose reduced states are more than configurations.
 
-What is carried depends on the way: after a shortcut, the rest of the plan has to be propagated
-again, and classified again wherever that made a difference.
+The rest of a reduced state, such as the rope's band, depends on the way that led to it. After a
+shortcut the states behind it are therefore propagated again, and the transitions that changed are
+classified again.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from planners.check_transition import CheckTransition, negative_log_likelihood
+from planners.path import Path
+from planners.planning_problem import PlanningProblem
 from systems.angles import shortest_way
-from systems.system import Array, System
+from systems.system import Array
 
 ROUNDS = 500
 LONGEST_SHORTCUT = 40
@@ -22,56 +25,42 @@ ARRIVED = 1e-6
 CLASSIFIED_AT_ONCE = 16
 
 
-@dataclass(frozen=True)
-class Path:
-    """States and the commands between them.
+class _Costed(NamedTuple):
+    """A path with the negative log-likelihood of each transition, shape (T,)."""
 
-    Attributes
-    ----------
-    reduced : ndarray of shape (T + 1, reduced_dim)
-    commands : ndarray of shape (T, command_dim)
-    """
-
-    reduced: Array
-    commands: Array
-
-
-@dataclass(frozen=True)
-class _Steps:
-    """States that were gone through, and the commands between them, maybe none."""
-
-    reduced: Array
-    commands: list[Array]
+    path: Path
+    costs: Array
 
 
 class RepropagatedShortcuts:
-    """Makes plans shorter by straight lines, of which every transition is checked.
+    """Replaces parts of a plan by straight lines, and checks every transition that changes.
 
-    Half of the lines are of the whole configuration; where the system has parts that move
-    independently, the others are of one part, while the rest goes on as it did.
+    Half of the lines are of the whole configuration. Where the system has parts that move
+    independently, the others are of one part, while the rest moves as it did.
 
-    A shortcut is taken if g allows every transition of it and of the plan's rest, the plan still
-    ends in a goal, and every transition that is not bit by bit one of the old plan's is
-    classified Reliable; and if together they are as likely to go well as those that they
-    replace. Nothing is drawn: a shortcut that is tried again and again until a draw lets it pass
-    would undo the bias.
+    A shortcut is taken if g allows every transition of it and of the plan's rest, if the plan
+    still ends in a goal, if every transition that is not bit by bit one of the old plan's is
+    classified Reliable, and if the new transitions are together as likely to be Reliable as those
+    they replace. No Unreliable transition is accepted at random here: a shortcut that is tried
+    until it happens to be accepted would undo the bias.
 
     Parameters
     ----------
-    system : System
-    goals : ndarray of shape (n_goals, configuration_dim)
+    problem : PlanningProblem
     check : CheckTransition
     rng : Generator
     """
 
     def __init__(
-        self, system: System, goals: Array, check: CheckTransition, rng: np.random.Generator
+        self, problem: PlanningProblem, check: CheckTransition, rng: np.random.Generator
     ) -> None:
-        self._system = system
-        self._dim = system.configuration_dim
-        self._goals = goals
+        self._system = problem.system
+        self._dim = problem.system.configuration_dim
+        self._goals = problem.goals
         self._check = check
         self._rng = rng
+        start = problem.starts[:1]
+        self._no_command = self._system.steer(start, start[:, : self._dim])[:0]
 
     def shorten(self, path: Path) -> Path:
         """Take shortcuts between random states of a plan.
@@ -86,40 +75,43 @@ class RepropagatedShortcuts:
         shortened : Path
             From the same start, in no more transitions.
         """
-        doubted = negative_log_likelihood(
-            self._check.probability(path.reduced[:-1], path.reduced[1:])
-        )
+        probability = self._check.probability(path.reduced[:-1], path.reduced[1:])
+        plan = _Costed(path, negative_log_likelihood(probability))
         for _ in range(ROUNDS):
-            if len(path.commands) < 2:
+            if len(plan.costs) < 2:
                 break
-            first, last = self._propose(len(path.reduced))
-            way = self._shorter_way(path.reduced[first : last + 1, : self._dim], self._draw_part())
-            if way is not None:
-                better = self._with_shortcut(path, doubted, first, last, way)
-                path, doubted = better or (path, doubted)
-        return path
+            first, last = self._propose(len(plan.path.reduced))
+            configurations = plan.path.reduced[first : last + 1, : self._dim]
+            waypoints = self._straightened(configurations, self._draw_part())
+            if waypoints is not None:
+                plan = self._with_shortcut(plan, first, last, waypoints) or plan
+        return plan.path
 
     def _propose(self, n_states: int) -> tuple[int, int]:
+        """Draw the first and the last state of a part of the plan."""
         first = int(self._rng.integers(n_states - 2))
         length = int(self._rng.integers(2, LONGEST_SHORTCUT + 1))
         return first, min(first + length, n_states - 1)
 
     def _draw_part(self) -> slice | None:
+        """Draw an independent part of the configuration, or None for the whole."""
         parts = self._system.independent_parts
         drawn = int(self._rng.integers(2 * max(1, len(parts))))
         return parts[drawn] if drawn < len(parts) else None
 
-    def _shorter_way(self, corners: Array, part: slice | None) -> Array | None:
+    def _straightened(self, configurations: Array, part: slice | None) -> Array | None:
         """Return configurations at most a step apart, or None if straightening saves nothing."""
-        moves = shortest_way(corners[:-1], corners[1:], self._system.angular)
-        line = corners[0] + np.concatenate([np.zeros((1, self._dim)), np.cumsum(moves, axis=0)])
+        moves = shortest_way(configurations[:-1], configurations[1:], self._system.angular)
+        line = configurations[0] + np.concatenate(
+            [np.zeros((1, self._dim)), np.cumsum(moves, axis=0)]
+        )
         if part is None:
             straight = line[[0, -1]]
         else:
             others = np.delete(moves, np.arange(self._dim)[part], axis=1)
             straight = line.copy()
-            ratio = _ratios(others)[:, None]
-            straight[:, part] = line[0, part] + ratio * (line[-1, part] - line[0, part])
+            share = _shares_travelled(others)[:, None]
+            straight[:, part] = line[0, part] + share * (line[-1, part] - line[0, part])
         travelled = np.linalg.norm(np.diff(straight, axis=0), axis=1).sum()
         if np.linalg.norm(moves, axis=1).sum() - travelled <= SMALLEST_SAVING:
             return None
@@ -127,75 +119,87 @@ class RepropagatedShortcuts:
         return _resampled(straight, n_steps) if n_steps <= len(moves) else None
 
     def _with_shortcut(
-        self, path: Path, doubted: Array, first: int, last: int, way: Array
-    ) -> tuple[Path, Array] | None:
-        """Return the plan with one shortcut and its transitions' costs, or None if not allowed."""
-        shortcut = self._go(path.reduced[first], way)
+        self, plan: _Costed, first: int, last: int, waypoints: Array
+    ) -> _Costed | None:
+        """Return the plan with a shortcut from one state to another; None if not allowed."""
+        path, costs = plan
+        shortcut = self._follow(path.reduced[first], waypoints)
         if shortcut is None:
             return None
-        on_shortcut = self._doubts_if_reliable(shortcut)
-        if on_shortcut is None:
-            return None
-        # What is carried differs behind the shortcut, until all is as it was.
+        # Behind the shortcut states differ, until they happen to be the same as before.
         behind = path.reduced[last:]
-        rest = self._go(shortcut.reduced[-1], behind[1:, : self._dim], behind)
+        rest = self._follow(shortcut.path.reduced[-1], behind[1:, : self._dim], behind)
         if rest is None:
             return None
-        on_rest = self._doubts_if_reliable(rest)
-        kept = last + len(rest.commands)
-        if on_rest is None or on_shortcut.sum() + on_rest.sum() > doubted[first:kept].sum():
+        kept = last + len(rest.costs)
+        if shortcut.costs.sum() + rest.costs.sum() > costs[first:kept].sum():
             return None
-        reduced = [path.reduced[:first], shortcut.reduced, rest.reduced[1:]]
-        commands = [*path.commands[:first], *shortcut.commands, *rest.commands]
+        states = (shortcut.path.reduced, rest.path.reduced[1:], path.reduced[kept + 1 :])
+        commands = (shortcut.path.commands, rest.path.commands, path.commands[kept:])
         joined = Path(
-            np.concatenate([*reduced, path.reduced[kept + 1 :]]),
-            np.array([*commands, *path.commands[kept:]]),
+            np.concatenate([path.reduced[:first], *states]),
+            np.concatenate([path.commands[:first], *commands]),
         )
         if not self._system.goal_reached(joined.reduced[-1:], self._goals)[0]:
             return None
-        return joined, np.concatenate([doubted[:first], on_shortcut, on_rest, doubted[kept:]])
+        new_costs = [costs[:first], shortcut.costs, rest.costs, costs[kept:]]
+        return _Costed(joined, np.concatenate(new_costs))
 
-    def _go(self, start: Array, way: Array, known: Array | None = None) -> _Steps | None:
-        """Go from one configuration to the next; None where that is not allowed.
+    def _follow(self, start: Array, waypoints: Array, known: Array | None = None) -> _Costed | None:
+        """Move from one configuration to the next by Reliable transitions that g allows.
 
-        Ends where a state is the one ``known`` before that configuration.
+        Parameters
+        ----------
+        start : ndarray of shape (reduced_dim,)
+        waypoints : ndarray of shape (n, configuration_dim)
+        known : ndarray of shape (n + 1, reduced_dim), default=None
+            States of the old plan; moving ends at the first that is the same.
+
+        Returns
+        -------
+        followed : _Costed or None
+            None where a transition is not allowed or not Reliable.
         """
-        states: list[Array] = [start]
-        commands: list[Array] = []
-        for i, target in enumerate(way):
+        path = self._propagated(start, waypoints, known)
+        costs = None if path is None else self._costs_if_reliable(path)
+        return None if path is None or costs is None else _Costed(path, costs)
+
+    def _propagated(self, start: Array, waypoints: Array, known: Array | None) -> Path | None:
+        states = [start]
+        commands = [self._no_command]
+        for i, target in enumerate(waypoints):
             if known is not None and np.array_equal(states[-1], known[i]):
                 break
-            step = self._step(states[-1], target)
-            if step is None or not self._arrived(step[1], target):
+            command = self._system.steer(states[-1][None], target[None])
+            following, valid = self._system.propagate(states[-1][None], command)
+            if not valid[0] or not self._arrived(following[0], target):
                 return None
-            commands.append(step[0])
-            states.append(step[1])
-        return _Steps(np.array(states), commands)
-
-    def _step(self, state: Array, target: Array) -> tuple[Array, Array] | None:
-        command = self._system.steer(state[None], target[None])
-        following, valid = self._system.propagate(state[None], command)
-        return (command[0], following[0]) if valid[0] else None
+            commands.append(command)
+            states.append(following[0])
+        return Path(np.array(states), np.concatenate(commands))
 
     def _arrived(self, state: Array, target: Array) -> bool:
         gap = np.abs(shortest_way(state[: self._dim], target, self._system.angular)).max()
         return bool(gap <= ARRIVED * self._system.step_size)
 
-    def _doubts_if_reliable(self, steps: _Steps) -> Array | None:
-        """Return each transition's doubt, or None if one is not classified Reliable."""
-        before, after = steps.reduced[:-1], steps.reduced[1:]
-        doubted = np.zeros(len(before))
+    def _costs_if_reliable(self, path: Path) -> Array | None:
+        """Return each transition's cost, or None if one is not classified Reliable."""
+        before, after = path.reduced[:-1], path.reduced[1:]
+        costs = np.zeros(len(before))
         for i in range(0, len(before), CLASSIFIED_AT_ONCE):
-            part = slice(i, i + CLASSIFIED_AT_ONCE)
-            reliable, probability = self._check.evaluate(before[part], after[part])
+            rows = slice(i, i + CLASSIFIED_AT_ONCE)
+            reliable, probability = self._check.evaluate(before[rows], after[rows])
             if not reliable.all():
                 return None
-            doubted[part] = negative_log_likelihood(probability)
-        return doubted
+            costs[rows] = negative_log_likelihood(probability)
+        return costs
 
 
-def _ratios(moves: Array) -> Array:
-    """Share of the way travelled at each corner, from 0 to 1; evenly spaced if there is none."""
+def _shares_travelled(moves: Array) -> Array:
+    """Return the share of the way travelled before and after each move, from 0 to 1.
+
+    Evenly spaced if there is no way to travel.
+    """
     lengths = np.linalg.norm(moves, axis=1)
     if lengths.sum() <= 0.0:
         lengths = np.ones(len(moves))
@@ -205,7 +209,7 @@ def _ratios(moves: Array) -> Array:
 
 def _resampled(line: Array, n_steps: int) -> Array:
     """Return the ends of steps of one length along a polyline, its last corner exactly."""
-    at_corners = _ratios(np.diff(line, axis=0))
+    at_corners = _shares_travelled(np.diff(line, axis=0))
     at_ends = np.linspace(0.0, 1.0, n_steps + 1)[1:]
     columns = [np.interp(at_ends, at_corners, column) for column in line.T]
     return np.column_stack(columns)

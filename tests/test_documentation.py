@@ -104,7 +104,10 @@ def test_no_import_runs_back_up_the_road(package):
                 "reliability/networks/training.py",
             },
         ),
-        ("ompl", {"planners/ompl_search.py"}),
+        (
+            "ompl",
+            {"planners/ompl_backend.py", "planners/ompl_globals.py", "planners/ompl_planner.py"},
+        ),
     ],
 )
 def test_heavy_libraries_have_one_home(library, allowed):

@@ -49,7 +49,12 @@ def test_any_plan_is_better_than_none_and_no_plan_is_a_result():
     assert failed.planning_time == 3.0
 
 
-def test_merit_is_the_callers():
+def test_a_plan_without_a_score_is_not_kept():
+    plans = [plan_of(0.9, np.nan, seed=0), plan_of(0.1, seed=1), plan_of(np.nan, seed=2)]
+    assert best_of_restarts(plans.__getitem__, 3).random_state == 1
+
+
+def test_the_score_is_the_callers():
     plans = [plan_of(0.1, 0.9, seed=0), plan_of(0.5, 0.8, seed=1)]
     last = best_of_restarts(plans.__getitem__, 2, score=lambda plan: plan.reliability[-1])
     assert last.random_state == 0

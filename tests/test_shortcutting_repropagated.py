@@ -1,4 +1,4 @@
-"""Shortcuts of plans with carried states: shorter, consistent, and checked throughout."""
+"""Shortcuts where a state is more than a configuration: shorter, consistent, all checked."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,9 @@ from toy_systems import Odometer
 
 from planners import BiasedRRT
 from planners.check_transition import CheckTransition
-from planners.shortcutting_repropagated import Path, RepropagatedShortcuts
+from planners.path import Path
+from planners.planning_problem import PlanningProblem
+from planners.shortcutting_repropagated import RepropagatedShortcuts
 from systems import Rope
 
 START, GOAL = np.array([-0.9, 0.0, 0.0]), np.array([0.9, 0.0])
@@ -47,7 +49,7 @@ def assert_all_were_called_reliable(system, recorder, result):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_shortcuts_make_plans_shorter_and_carry_on(seed):
+def test_shortcuts_make_plans_shorter_and_propagate_the_rest(seed):
     system = Odometer()
     long, short = (
         BiasedRRT(system, simplify=simplify, random_state=seed).plan(START, GOAL)
@@ -95,7 +97,8 @@ def test_a_way_back_to_the_old_states_keeps_the_rest():
 
     system = Lengthless()
     corners = np.array([[0.5, -0.9], [0.5, -0.5], [0.9, -0.5], [0.9, 0.75]])
-    recorder = Recorder(lambda rows: np.ones(len(rows), dtype=bool))
+    # The last part of the plan is Unreliable, and stays as it was.
+    recorder = Recorder(lambda rows: rows[:, 1] < -0.3)
     check = CheckTransition(system, recorder, k=np.inf, accuracy=None, rng=np.random.default_rng(0))
     state, states, commands = np.array([*corners[0], 0.0]), [], []
     for corner in corners[1:]:
@@ -105,9 +108,8 @@ def test_a_way_back_to_the_old_states_keeps_the_rest():
             state = system.propagate(state[None], commands[-1][None])[0][0]
     path = Path(np.array([*states, state]), np.array(commands))
     goals = corners[-1:]
-    shortcuts = RepropagatedShortcuts(
-        system, path.reduced[-1:, :2], check, np.random.default_rng(1)
-    )
+    problem = PlanningProblem(system, path.reduced[:1], path.reduced[-1:, :2])
+    shortcuts = RepropagatedShortcuts(problem, check, np.random.default_rng(1))
     shortened = shortcuts.shorten(path)
     assert_follows_g(system, shortened.reduced, shortened.commands)
     assert len(shortened.commands) < len(commands)

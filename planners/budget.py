@@ -1,0 +1,59 @@
+"""When a search has to stop."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from planners.result import PlanStatus
+
+
+def never() -> bool:
+    """Let a search go on."""
+    return False
+
+
+class Budget:
+    """The iterations and the time that a search may use, counted from construction.
+
+    Parameters
+    ----------
+    max_iterations : int
+        Samples that the search may draw.
+    time_limit : float or None
+        Seconds that the search may take.
+    terminated : callable, default=never
+        Asked before each round of the search; it stops when the answer is True. OMPL's
+        termination conditions are such callables.
+
+    Attributes
+    ----------
+    limit : PlanStatus
+        Which limit was reached, once :meth:`exhausted` has returned True.
+    """
+
+    def __init__(
+        self,
+        max_iterations: int,
+        time_limit: float | None = None,
+        terminated: Callable[[], bool] = never,
+    ) -> None:
+        self._left = max_iterations
+        self._deadline = np.inf if time_limit is None else time.perf_counter() + time_limit
+        self._terminated = terminated
+        self.limit = PlanStatus.ITERATION_LIMIT
+
+    def exhausted(self, n_iterations: int = 1) -> bool:
+        """Take iterations from the budget, or return True where it doesn't allow them."""
+        if self._left < n_iterations:
+            self.limit = PlanStatus.ITERATION_LIMIT
+        elif time.perf_counter() > self._deadline:
+            self.limit = PlanStatus.TIME_LIMIT
+        elif self._terminated():
+            self.limit = PlanStatus.TERMINATED
+        else:
+            self._left -= n_iterations
+            return False
+        return True
