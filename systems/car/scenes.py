@@ -11,6 +11,7 @@ from systems.validation import RandomState, as_finite_array, as_generator, is_nu
 
 LOT_SIZE = 8.0
 MIN_OBSTACLES, MAX_OBSTACLES = 5, 10
+POINTS_AROUND = 48
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,13 @@ class Circle:
         as_finite_array([self.x, self.y], "centre", (2,))
         if not is_number(self.radius) or not 0 < self.radius < np.inf:
             raise ValueError(f"radius must be a positive number, got {self.radius!r}.")
+
+    @property
+    def outline(self) -> Array:
+        """Points around the edge, counter-clockwise, in metres, shape (48, 2): for pictures."""
+        around = np.linspace(0, 2 * np.pi, POINTS_AROUND, endpoint=False)
+        ring = np.column_stack([np.cos(around), np.sin(around)])
+        return np.array([self.x, self.y]) + self.radius * ring
 
 
 @dataclass(frozen=True)
@@ -59,6 +67,11 @@ class ConvexPolygon:
                 "corners must be those of a convex polygon, three or more, counter-clockwise, "
                 f"got {self.corners!r}."
             )
+
+    @property
+    def outline(self) -> Array:
+        """The corners, in metres, shape (n_corners, 2): for pictures."""
+        return np.array(self.corners, dtype=np.float64)
 
 
 @dataclass(frozen=True)
