@@ -14,6 +14,7 @@ from .rope.obstacles.shapes import Capsule as Capsule
 from .rope.obstacles.shapes import Cylinder as Cylinder
 from .rope.paper_scenes import SCENE_NAMES as SCENE_NAMES
 from .rope.paper_scenes import load_scene as load_scene
+from .rope.random_scenes import has_slot_and_slit as has_slot_and_slit
 from .rope.random_scenes import random_rope_scene as random_rope_scene
 from .rope.renderer import BAND_COLOR as BAND_COLOR
 from .rope.renderer import ROPE_COLOR as ROPE_COLOR

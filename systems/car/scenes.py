@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from systems.car.geometry import PackedScene
 from systems.validation import RandomState, as_finite_array, as_generator, is_number
@@ -36,7 +37,7 @@ class Circle:
             raise ValueError(f"radius must be a positive number, got {self.radius!r}.")
 
     @property
-    def outline(self) -> Array:
+    def outline(self) -> NDArray[np.float64]:
         """Points around the edge, counter-clockwise, in metres, shape (48, 2): for pictures."""
         around = np.linspace(0, 2 * np.pi, POINTS_AROUND, endpoint=False)
         ring = np.column_stack([np.cos(around), np.sin(around)])
@@ -69,7 +70,7 @@ class ConvexPolygon:
             )
 
     @property
-    def outline(self) -> Array:
+    def outline(self) -> NDArray[np.float64]:
         """The corners, in metres, shape (n_corners, 2): for pictures."""
         return np.array(self.corners, dtype=np.float64)
 
