@@ -99,7 +99,7 @@ def test_systems_know_only_what_all_systems_share():
 
 @pytest.mark.parametrize("folder", ["benchmarks", "examples"])
 def test_experiments_and_examples_import_public_names_only(folder):
-    files = {file for file in (ROOT / folder).rglob("*.py")}
+    files = set((ROOT / folder).rglob("*.py"))
     assert files
     for file in files - INSIDERS:
         for name in imported_modules(file):

@@ -2,8 +2,9 @@
 
 Run as ``python -m benchmarks.rope.random_scenes --jobs 2``. Of the random scenes drawn from
 ``--first`` on, those count in which the rope has to pass a slot (a narrow gap in a wall between the
-grippers) and a slit (a gap in a wall across the way), and the first plan without a classifier goes
-wrong. Their seed is not that of the scenes that the models learned from. A scene takes about a minute; a line is printed for each, and the sums at the end.
+grippers) and a slit (a gap in a wall across the way), and in which the first plan without a
+classifier goes wrong. Their seed is not that of the scenes that the models learned from. A scene
+takes about a minute; a line is printed for each, and the sums at the end.
 """
 
 from __future__ import annotations
