@@ -1,3 +1,5 @@
+from .angles import shortest_way as shortest_way
+from .angles import wrap_columns as wrap_columns
 from .car.car import Car as Car
 from .car.scenes import CarScene as CarScene
 from .car.scenes import Circle as Circle
@@ -10,8 +12,13 @@ from .planar_arm.planar_arm import PlanarArm as PlanarArm
 from .rope.obstacles.shapes import Box as Box
 from .rope.obstacles.shapes import Capsule as Capsule
 from .rope.obstacles.shapes import Cylinder as Cylinder
+from .rope.paper_scenes import SCENE_NAMES as SCENE_NAMES
 from .rope.paper_scenes import load_scene as load_scene
+from .rope.random_scenes import has_slot_and_slit as has_slot_and_slit
 from .rope.random_scenes import random_rope_scene as random_rope_scene
+from .rope.renderer import BAND_COLOR as BAND_COLOR
+from .rope.renderer import ROPE_COLOR as ROPE_COLOR
+from .rope.renderer import SceneRenderer as SceneRenderer
 from .rope.rope import Rope as Rope
 from .rope.scene import Scene as Scene
 from .rope.simulation.state import RopeState as RopeState

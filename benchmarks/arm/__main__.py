@@ -37,7 +37,7 @@ from reliability import (
 )
 from systems import PlanarArm
 
-# Seeds of data, training, tuning (benchmarks/arm_tuning.py) and queries never meet.
+# Data, training, tuning (benchmarks.arm.tuning, seed 3) and queries have different seeds.
 DATA_SEED, TRAINING_SEED, QUERY_SEED, ANY_START_SEED, DEMO_SEED = 1, 2, 4, 5, 6
 THRESHOLDS = (0.02, 0.03, 0.05, 0.075, 0.1, 0.2, 0.5, 1.0, 2.0)
 BETA = 0.1

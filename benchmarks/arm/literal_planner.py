@@ -11,9 +11,7 @@ from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
-from planners import CheckTransition
-from planners.edge_checker import EdgeChecker
-from planners.edge_discretization import split_edges
+from planners import CheckTransition, EdgeChecker, split_edges
 from systems import System
 
 MAX_ITERATIONS = 20_000
@@ -35,9 +33,10 @@ class LiteralResult:
 class LiteralPlanner:
     """OMPL's defaults with Algorithm 1 as motion validator.
 
-    All goals are given to RRT-Connect, its range is OMPL's default of a fifth of the space, and
-    simplifyMax asks the same validator, draws and all, in whatever direction it likes. Both are
-    bounded, because neither need come to an end.
+    All goals are given to RRT-Connect, and its range is OMPL's default of a fifth of the space.
+    simplifyMax asks the same motion validator, which accepts Unreliable transitions at random, and
+    asks about edges in either direction. Search and simplification are bounded, because neither
+    has to come to an end by itself.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """How k, the length of edges and simplification were chosen for the arm.
 
-Runs on training queries, whose seed examples/arm.py uses for nothing else. Needs the model that
-`make arm` leaves in build/arm.
+Run as ``python -m benchmarks.arm.tuning``. Its queries have a seed that `benchmarks.arm` uses for
+nothing else. Needs the model that `make arm` leaves in build/arm.
 """
 
 from __future__ import annotations

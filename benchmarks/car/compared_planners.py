@@ -9,14 +9,14 @@ import numpy as np
 from benchmarks.car.waypoints import move_waypoints
 from planners import BiasedRRT, BiasedRRTConnect, PlanResult, best_of_restarts
 from systems import Car, CarScene, Problem
-from systems.angles import shortest_way
 
 PLANNERS = ("none", "classifier", "waypoints moved", "ours", "ceiling")
 BETA = 0.3
 ITERATIONS = 8000
-# Of a plan's transitions together; a plan that promises less is made again, a few times.
-PROMISE = 0.6
+# A plan that is less likely to succeed is made again, a few times.
+ENOUGH = 0.6
 MOST_PLANS = 4
+# The most that a command may leave the car farther from its target than it was, in m and rad.
 MOST_STRAYED = 0.3
 
 
@@ -33,12 +33,12 @@ class TrueCar(Car):
         return np.array(state, dtype=np.float64)
 
     def propagate(self, reduced: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Execute; what comes to a boundary, or far from its target, has no successor."""
+        """Execute; there is no successor if the car hits something or strays from its target."""
         following, completed = self.execute(reduced, command)
         target = reduced[:, :3] + command
-        left = np.linalg.norm(shortest_way(following[:, :3], target, self.angular), axis=1)
+        left = self.distance(following[:, :3], target)
         length = np.linalg.norm(command, axis=1)
-        # The planner asks once whether the start is one from which the car can stand still.
+        # A planner first asks whether the car can stand still at the start: no way, no straying.
         return following, completed & ((left < length + MOST_STRAYED) | (length == 0))
 
     def steer(self, reduced: np.ndarray, configuration: np.ndarray) -> np.ndarray:
@@ -65,15 +65,15 @@ def plan_query(
         return careful_planner(car, classifier, seed).plan(car.reduce(problem.start), problem.goal)
     if name == "waypoints moved":
         return careful_plan(car, classifier, problem, seed)
-    return promising_plan(car, classifier, problem, seed)
+    return likely_plan(car, classifier, problem, seed)
 
 
-def promising_plan(car: Car, classifier: Any, problem: Problem, seed: int) -> PlanResult:
+def likely_plan(car: Car, classifier: Any, problem: Problem, seed: int) -> PlanResult:
     """Plan until a plan is likely enough to go well, and keep the likeliest."""
     return best_of_restarts(
         lambda i: careful_plan(car, classifier, problem, MOST_PLANS * seed + i),
         MOST_PLANS,
-        enough=PROMISE,
+        enough=ENOUGH,
     )
 
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from planners import PlanResult
-from systems import Car
-from systems.angles import shortest_way, wrap_columns
+from systems import Car, shortest_way, wrap_columns
 
 ROUNDS = 20
 # Metres and radians; each is tried twice.
@@ -29,7 +28,7 @@ def move_waypoints(car: Car, classifier: Any, plan: PlanResult, seed: int) -> Pl
     began = time.perf_counter()
     rng = np.random.default_rng(seed)
     path = plan.reduced.copy()
-    negative_log_likelihood = transition_doubts(car, classifier, path[:-1], path[1:])
+    negative_log_likelihood = negative_log_likelihoods(car, classifier, path[:-1], path[1:])
     for number in range(ROUNDS):
         # While a waypoint moves, its neighbours stand still.
         moving = np.arange(1 + number % 2, len(negative_log_likelihood), 2)
@@ -56,7 +55,7 @@ def _move(
     proposed = path[moving][:, None] + SPREADS[:, None] * rng.normal(size=shape)
     middle = wrap_columns(proposed.reshape(-1, 3), car.angular)
     before, after = (np.repeat(path[moving + i], len(SPREADS), axis=0) for i in (-1, 1))
-    both = transition_doubts(
+    both = negative_log_likelihoods(
         car, classifier, np.concatenate([before, middle]), np.concatenate([middle, after])
     ).reshape(2, *shape[:2])
     best = both.sum(axis=0).argmin(axis=1)
@@ -68,10 +67,10 @@ def _move(
     negative_log_likelihood[at - 1], negative_log_likelihood[at] = first[better], second[better]
 
 
-def transition_doubts(
+def negative_log_likelihoods(
     car: Car, classifier: Any, reduced: np.ndarray, next_reduced: np.ndarray
 ) -> np.ndarray:
-    """Return -log of each transition's probability; infinite where it may not be taken."""
+    """Return -log of the probability that each transition is Reliable; infinite if forbidden."""
     commands = shortest_way(reduced, next_reduced, car.angular)
     short = np.linalg.norm(commands, axis=1) <= car.step_size * (1 + 1e-9)
     possible = np.flatnonzero(short)

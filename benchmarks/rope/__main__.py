@@ -21,10 +21,15 @@ from PIL import Image
 
 from planners import BiasedRRT
 from reliability import load_estimator
-from systems import Problem, Rollout, Rope
-from systems.rope.band.band import band_points
-from systems.rope.paper_scenes import SCENE_NAMES
-from systems.rope.renderer import BAND_COLOR, ROPE_COLOR, SceneRenderer
+from systems import (
+    BAND_COLOR,
+    ROPE_COLOR,
+    SCENE_NAMES,
+    Problem,
+    Rollout,
+    Rope,
+    SceneRenderer,
+)
 
 MODELS = Path(__file__).parent / "models"
 K = 10.0
@@ -144,7 +149,8 @@ def animate(pictures: SceneRenderer, trials: tuple[Trial, Trial], path: Path) ->
 
 def draw(pictures: SceneRenderer, trial: Trial, moment: int) -> np.ndarray:
     """Draw the rope at a moment, and the band that was planned for it."""
-    band = band_points(trial.bands[moment])
+    # A band is both gripper positions, and then its points.
+    band = trial.bands[moment, 6:].reshape(-1, 3)
     nodes = trial.rollout.states[moment].nodes
     return pictures.render([(nodes, ROPE_COLOR), (band, BAND_COLOR)])
 

@@ -1,9 +1,10 @@
 """Plans in random scenes that nothing was learned from, with each of Table I's columns.
 
 Run as ``python -m benchmarks.rope.random_scenes --jobs 2``. Of the random scenes drawn from
-``--first`` on, those count in which a slot parts the grippers, a slit has to be passed, and the
-first plan without a classifier goes wrong. Their seed is not that of the scenes that the models
-learned from. A scene takes about a minute; a line is printed for each, and the sums at the end.
+``--first`` on, those count in which the rope has to pass a slot (a narrow gap in a wall between the
+grippers) and a slit (a gap in a wall across the way), and in which the first plan without a
+classifier goes wrong. Their seed is not that of the scenes that the models learned from. A scene
+takes about a minute; a line is printed for each, and the sums at the end.
 """
 
 from __future__ import annotations
@@ -17,8 +18,13 @@ import numpy as np
 from benchmarks.rope.table1 import COLUMNS, UNCLASSIFIED
 from benchmarks.rope.table1_trials import MAX_ITERATIONS, TOLERANCE, model_at
 from planners import BiasedRRT
-from systems import Rope, Scene, SimulationDivergedError, random_rope_scene
-from systems.rope.random_scenes import has_slot_and_slit
+from systems import (
+    Rope,
+    Scene,
+    SimulationDivergedError,
+    has_slot_and_slit,
+    random_rope_scene,
+)
 
 SEED = 2026
 K = 10.0

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import matplotlib.image
 
-from systems.rope.paper_scenes import SCENE_NAMES, load_scene
-from systems.rope.renderer import ROPE_COLOR, SceneRenderer
+from systems import ROPE_COLOR, SCENE_NAMES, SceneRenderer, load_scene
 
 
 def main(folder: Path) -> None:

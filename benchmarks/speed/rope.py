@@ -71,14 +71,14 @@ def print_voxnet(rope: Rope) -> None:
 
 
 def print_boosting(rope: Rope) -> None:
-    """Print what curtains and the trees of Table I's "ours" cost, asked in either way."""
+    """Print what clearance features and the trees of Table I's "ours" cost, asked in either way."""
     model = load_estimator(COLUMNS["ours"])
     before, after = transitions(rope)
     rows = rope.features(before, after)
     sizes = " | ".join(f"rows/s, {n} at a time" for n in BATCHES)
     print(f"\n| ours | {sizes} |\n|" + "---|" * (1 + len(BATCHES)))
     calls = {
-        "curtains": lambda n: rope.features(before[:n], after[:n]),
+        "clearance features": lambda n: rope.features(before[:n], after[:n]),
         "trees, scikit-learn": lambda n: model.decision_function(rows[:n]),
         "trees, as planners ask": lambda n: model.fast_decision_function(rows[:n]),
     }

@@ -17,7 +17,13 @@ from systems.car.dynamics import (
     trace_commands,
 )
 from systems.car.features import transition_features
-from systems.car.geometry import clearances, limited_ways, straight_moves
+from systems.car.geometry import (
+    CAR_RADIUS,
+    WHEELBASE,
+    clearances,
+    limited_ways,
+    straight_moves,
+)
 from systems.car.scenes import SCENES, CarScene, pack_scene
 from systems.system import Array, Problem, Rollout, StopReason, System
 from systems.validation import RandomState, as_finite_array, as_generator, check_rows
@@ -180,6 +186,28 @@ class Car(System):
         moves = as_finite_array(commands, "commands", (None, 3))
         states = np.empty((1 + len(moves) * (1 + round(LONGEST_COMMAND / TIME_STEP)), 5))
         return states[: trace_commands(start, moves, self._packed, states)]
+
+    def outline(self, pose: ArrayLike) -> Array:
+        """Return the edge of the footprint at a pose, counter-clockwise, for pictures.
+
+        Parameters
+        ----------
+        pose : array-like of shape (3,)
+            x, y and θ; the entries of a longer array, such as a true state, are not read.
+
+        Returns
+        -------
+        outline : ndarray of shape (43, 2)
+            x and y, in metres, in the scene's frame; the last point is the first again.
+        """
+        x, y, heading = as_finite_array(pose, "pose", (None,))[:3]
+        rear, front = np.linspace([np.pi / 2, -np.pi / 2], [3 * np.pi / 2, np.pi / 2], 21).T
+        around = np.concatenate([rear, front, rear[:1]])
+        axle = np.repeat([0.0, WHEELBASE, 0.0], [21, 21, 1])
+        own = np.column_stack([axle, np.zeros_like(axle)])
+        own += CAR_RADIUS * np.column_stack([np.cos(around), np.sin(around)])
+        turn = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
+        return np.array([x, y]) + own @ turn
 
     def close(self, predicted: Array, executed: Array) -> NDArray[np.bool_]:
         """Say for each row whether two poses are less than α = 0.15 (m, rad) apart: Close."""

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from systems.car.geometry import PackedScene
 from systems.validation import RandomState, as_finite_array, as_generator, is_number
 
 LOT_SIZE = 8.0
 MIN_OBSTACLES, MAX_OBSTACLES = 5, 10
+POINTS_AROUND = 48
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,13 @@ class Circle:
         as_finite_array([self.x, self.y], "centre", (2,))
         if not is_number(self.radius) or not 0 < self.radius < np.inf:
             raise ValueError(f"radius must be a positive number, got {self.radius!r}.")
+
+    @property
+    def outline(self) -> NDArray[np.float64]:
+        """Points around the edge, counter-clockwise, in metres, shape (48, 2): for pictures."""
+        around = np.linspace(0, 2 * np.pi, POINTS_AROUND, endpoint=False)
+        ring = np.column_stack([np.cos(around), np.sin(around)])
+        return np.array([self.x, self.y]) + self.radius * ring
 
 
 @dataclass(frozen=True)
@@ -59,6 +68,11 @@ class ConvexPolygon:
                 "corners must be those of a convex polygon, three or more, counter-clockwise, "
                 f"got {self.corners!r}."
             )
+
+    @property
+    def outline(self) -> NDArray[np.float64]:
+        """The corners, in metres, shape (n_corners, 2): for pictures."""
+        return np.array(self.corners, dtype=np.float64)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,85 @@
+"""The examples run as a user runs them: as files, from another folder; fewer plans save time."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib.image
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FILES = sorted((ROOT / "examples").glob("*.py"))
+# Constants of a file that are smaller here, and what the file then prints, in this order.
+RUNS = {
+    "quickstart.py": (
+        {"N_PLANS": "120"},
+        [r"transitions, held-out accuracy \d\d%", r"without .* stand\? False", "stand\\? True"],
+    ),
+    "any_estimator.py": (
+        {"N_PLANS": "40", "N_PROBLEMS": "3"},
+        [r"no classifier +3 ", r"logistic regression +\d\d", r"calibrated network +\d\d"],
+    ),
+    "own_system.py": ({}, [r"without .* ends at \[1\.\d+ +3", r"with .* ends at \[0\.5 +3"]),
+    "own_scene.py": ({"N_PLANS": "4"}, ["are Unreliable", "Without .*plan", "With .*plan"]),
+    "arm.py": (
+        {"N_PLANS": "150", "N_TESTS": "3"},
+        ["of them Unreliable", r"Without .* in \d of 3", r"With .* in [23] of 3"],
+    ),
+    "car.py": (
+        {"N_PLANS, N_TESTS": "(300, 60), 3"},
+        ["round 2", r"Without .* in [01] of 3", r"With .* in \d of 3"],
+    ),
+    "rope.py": ({}, [r"Without .* gets caught.*stretch", "With .* passes. Every command was"]),
+}
+PICTURES = {"own_scene.py", "arm.py", "car.py", "rope.py"}
+
+
+def shrunk(code, constants):
+    for name, value in constants.items():
+        code, n = re.subn(rf"^{re.escape(name)} = .*$", f"{name} = {value}", code, flags=re.M)
+        assert n == 1, f"{name} must be a constant of the module"
+    return code
+
+
+def test_every_example_is_run():
+    assert {file.name for file in FILES} == set(RUNS)
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_the_example_runs_anywhere(name, tmp_path):
+    constants, expected = RUNS[name]
+    # A file of the same depth, so that the example finds what it refers to.
+    folder = tmp_path / "examples"
+    folder.mkdir()
+    (tmp_path / "benchmarks").symlink_to(ROOT / "benchmarks")
+    code = (ROOT / "examples" / name).read_text()
+    (folder / name).write_text(shrunk(code, constants))
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    run = subprocess.run(
+        [sys.executable, folder / name],
+        cwd=elsewhere,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "agg"},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    assert re.search(".*".join(expected), run.stdout, flags=re.S), run.stdout
+    picture = elsewhere / f"{Path(name).stem}.png"
+    assert list(elsewhere.iterdir()) == ([picture] if name in PICTURES else [])
+    if name in PICTURES:
+        pixels = matplotlib.image.imread(picture)
+        assert min(pixels.shape[:2]) > 300
+        assert pixels[..., :3].std() > 0.05, "not blank"
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
+def test_an_example_is_first_code(file):
+    code = file.read_text()
+    assert len(code.splitlines()) <= 60
+    assert not re.search(r"argparse|sys\.path|^(from|import) (benchmarks|examples)", code, re.M)
+    assert code.startswith('"""'), "says what it shows"
