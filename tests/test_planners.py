@@ -106,8 +106,8 @@ def test_shortcuts_let_no_unreliable_transition_in(planner, kind):
         parameters = {"k": 0.5, "random_state": seed}
         found = planner(system, kind(), simplify=False, **parameters).plan(START, GOAL)
         shorter = planner(system, kind(), simplify=True, **parameters).plan(START, GOAL)
-        distrusted = shorter.reliability == 0
-        rows = system.features(shorter.reduced[:-1], shorter.reduced[1:])[distrusted]
+        unreliable = shorter.reliability == 0
+        rows = system.features(shorter.reduced[:-1], shorter.reduced[1:])[unreliable]
         assert {tuple(row) for row in rows} <= rows_of(system, found)
         assert len(shorter.commands) <= len(found.commands)
         assert shorter.n_accepted_unreliable == found.n_accepted_unreliable
@@ -225,7 +225,7 @@ def test_a_start_at_the_goal_is_a_plan_of_nothing(planner):
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
-def test_goals_that_are_distrusted_are_set_aside(planner):
+def test_goals_that_are_unreliable_to_stay_at_are_left_out(planner):
     goals = np.array([[0.9, -0.5], [0.9, 0.5]])
     for seed in range(8):
         result = planner(Disc(), HalfPlane(), random_state=seed).plan([-0.9, 0.5], goals)
@@ -248,7 +248,7 @@ class LessAndLess:
 
 @pytest.mark.parametrize("planner", PLANNERS)
 @pytest.mark.parametrize("order", [[0, 1, 2], [2, 0, 1], [1, 2, 0]])
-def test_the_least_bad_goal_is_kept_when_all_are_distrusted(planner, order):
+def test_the_most_reliable_goal_is_kept_when_none_is_reliable(planner, order):
     goals = np.array([[0.9, -0.9], [0.9, 0.6], [0.9, -0.5]])
     result = planner(Disc(), LessAndLess(), k=0.1, random_state=0).plan([-0.9, 0.5], goals[order])
     assert result.success

@@ -32,7 +32,7 @@ PLANS = [
 
 
 @pytest.mark.parametrize(("enough", "kept", "made"), [(0.2, 1, 2), (0.7, 2, 3), (1.0, 3, 4)])
-def test_it_stops_at_a_plan_that_promises_enough(enough, kept, made):
+def test_it_stops_at_a_plan_that_is_likely_enough(enough, kept, made):
     result = best_of_restarts(PLANS.__getitem__, 4, enough=enough)
     assert result.random_state == kept
     assert result.success_probability == pytest.approx(np.prod(PLANS[kept].reliability))
