@@ -256,8 +256,9 @@ class Transitions:
         """
         follows = np.zeros(len(self), dtype=np.bool_)
         follows[1:] = (self.plan[1:] == self.plan[:-1]) & (self.step[1:] == self.step[:-1] + 1)
+        follows[1:] &= self.executed[1:] == self.executed[:-1]
         had_diverged = np.zeros(len(self), dtype=np.bool_)
-        had_diverged[1:] = follows[1:] & (self.y[:-1] == UNRELIABLE) & ~self.executed[:-1]
+        had_diverged[1:] = follows[1:] & (self.y[:-1] == UNRELIABLE)
         return (self.y == UNRELIABLE) & (self.executed | ~had_diverged)
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:

@@ -258,6 +258,10 @@ def test_divergence_onsets_follow_reliable_transitions_of_the_same_plan():
     executed = np.array([False, False, False, True, True, True, True])
     data = Transitions(zeros, zeros, zeros, 0 * y, plan, step, executed=executed)
     assert data.divergence_onsets().tolist() == [True, False, False, True, True, True, True]
+    mixed = Transitions(
+        zeros[:2], zeros[:2], zeros[:2], y[1:3], plan[:2], step[:2], None, np.array([True, False])
+    )
+    assert mixed.divergence_onsets().all(), "neither follows a transition of its own kind"
 
 
 def test_a_tail_labelled_from_executed_states_is_kept():
