@@ -4,10 +4,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from planners import BiasedRRT
-from reliability import FastHistGradientBoostingClassifier, Summary, collect_transitions
+from reliability import Summary, TransitionReliabilityClassifier, collect_transitions
 from systems import BAND_COLOR, ROPE_COLOR, Box, Rope, Scene, SceneRenderer
 
-N_PLANS = 30
+N_PLANS = 24
 
 # Metres, z up. A box is its centre, its half extents and a name that decides its colour.
 scene = Scene(
@@ -26,14 +26,13 @@ rope = Rope(scene, features="clearance")
 with SceneRenderer(scene, width=900, height=560, azimuth=60, elevation=-25) as pictures:
     data = collect_transitions(rope, BiasedRRT(rope), N_PLANS, n_jobs=2, random_state=0)
     print(Summary.of(data))
-    classifier = FastHistGradientBoostingClassifier(
-        max_iter=60, class_weight="balanced", random_state=0
-    ).fit(data.features(rope), data.y)
+    classifier = TransitionReliabilityClassifier(class_weight="balanced", random_state=0)
+    classifier.fit(data.features(rope), data.y, groups=data.plan)
 
     problem = rope.scene_problem()
     figure, axes = plt.subplots(1, 2, figsize=(12, 4), layout="constrained")
     for axis, name, estimator in zip(axes, ("Without", "With"), (None, classifier), strict=True):
-        planner = BiasedRRT(rope, estimator, k=10, accuracy=0.9, random_state=0)
+        planner = BiasedRRT(rope, estimator, k=10, time_limit=15.0, random_state=0)
         plan = planner.plan(rope.reduce(problem.start), problem.goal)
         rollout = rope.rollout(problem.start, plan.commands)
         print(f"{name} the classifier: {plan.status.value} {rollout.stop_reason.value}")

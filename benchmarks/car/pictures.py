@@ -200,16 +200,12 @@ def _draw_query(axis: Axes, scene: CarScene, problem: Problem) -> None:
 def _draw_scene(axis: Axes, scene: CarScene) -> None:
     x_min, y_min, x_max, y_max = scene.bounds
     for obstacle in scene.obstacles:
-        if isinstance(obstacle, Circle):
-            shape = plt.Circle((obstacle.x, obstacle.y), obstacle.radius, color="0.65")
-        else:
-            shape = plt.Polygon(obstacle.corners, color="0.65")
-        axis.add_patch(shape)
+        axis.fill(*obstacle.outline.T, color="0.65", linewidth=0)
     axis.set(xlim=(x_min, x_max), ylim=(y_min, y_max), aspect="equal", xticks=[], yticks=[])
 
 
 def _draw_car(axis: Axes, pose: np.ndarray, color: str, dashed: bool = False) -> None:
-    outline = _outline(pose)
+    outline = Car().outline(pose)
     axis.plot(*outline.T, color=color, linewidth=1.3, linestyle="--" if dashed else "-")
     _draw_arrow(axis, pose, color)
 
@@ -220,12 +216,3 @@ def _draw_arrow(axis: Axes, pose: np.ndarray, color: str, size: float = 1.0) -> 
     tail = pose[:2] + 0.1 * heading * (size == 1)
     corners = [tail + 0.2 * size * heading, tail + 0.08 * size * left, tail - 0.08 * size * left]
     axis.add_patch(plt.Polygon(corners, color=color, linewidth=0))
-
-
-def _outline(pose: np.ndarray) -> np.ndarray:
-    """Return the rounded outline of the footprint, (n, 2)."""
-    around = np.linspace(np.pi / 2, 5 * np.pi / 2, 41)
-    ends = np.where(np.cos(around) > 1e-9, 0.3, 0.0)
-    outline = np.column_stack([ends + 0.15 * np.cos(around), 0.15 * np.sin(around)])
-    cosine, sine = np.cos(pose[2]), np.sin(pose[2])
-    return pose[:2] + outline @ np.array([[cosine, sine], [-sine, cosine]])

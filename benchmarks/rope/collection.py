@@ -11,10 +11,7 @@ import numpy as np
 
 from planners import BiasedRRT
 from reliability import UNRELIABLE, Transitions, collect_transitions
-from systems import Problem, Rope, Scene, random_rope_scene
-from systems.rope.paper_scenes import load_scene
-from systems.rope.random_scenes import has_slot_and_slit
-from systems.validation import RandomState
+from systems import Problem, Rope, Scene, has_slot_and_slit, load_scene, random_rope_scene
 
 PAPER_SEED = 2020
 RANDOM_SCENE_SEED = 2021
@@ -68,7 +65,7 @@ class RopeWithoutSlackLimit(Rope):
 class RopeFromSceneStart(RopeWithoutSlackLimit):
     """A rope whose problems are all the scene's own, as those that a plan is wanted for are."""
 
-    def sample_problem(self, random_state: RandomState = None) -> Problem:
+    def sample_problem(self, random_state: Any = None) -> Problem:
         """Return the scene's start and goal, whatever the random state."""
         return self.scene_problem()
 

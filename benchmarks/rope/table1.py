@@ -22,8 +22,7 @@ from scipy.stats import binomtest
 
 from benchmarks.rope.table1_trials import Column, Trial
 from reliability import Job, run_jobs
-from systems.rope.features.registry import FEATURES
-from systems.rope.paper_scenes import SCENE_NAMES
+from systems import SCENE_NAMES
 
 MODELS = Path(__file__).with_name("models")
 # Features of ropes without a classifier: nothing reads them, but with "clearance" a rope carries
@@ -51,7 +50,12 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the trials that are missing and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--columns", nargs="+", default=["none"], help="names or joblib files")
-    parser.add_argument("--features", choices=FEATURES, default="voxels", help="of such files")
+    parser.add_argument(
+        "--features",
+        choices=("voxels", "clearance", "vector"),
+        default="voxels",
+        help="of such files",
+    )
     parser.add_argument("--scenes", nargs="+", choices=SCENE_NAMES, default=SCENE_NAMES)
     parser.add_argument("--seeds", type=int, default=30, help="trials per scene")
     parser.add_argument("--first-seed", type=int, default=0)

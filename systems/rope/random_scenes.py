@@ -61,7 +61,20 @@ def random_rope_scene(random_state: RandomState = None) -> Scene:
 
 
 def has_slot_and_slit(scene: Scene) -> bool:
-    """Say whether a random scene has a wall with a slot and, across it, one with a slit."""
+    """Tell whether the rope of a random scene must pass a slot and a slit.
+
+    A slot is a narrow gap, for the rope alone, in a wall that parts the grippers; a slit is a gap
+    in a wall across the way.
+
+    Parameters
+    ----------
+    scene : Scene
+        From :func:`random_rope_scene`, which names the walls.
+
+    Returns
+    -------
+    has_both : bool
+    """
     return {"lower slotted wall", "lower wall"} <= {obstacle.name for obstacle in scene.obstacles}
 
 
