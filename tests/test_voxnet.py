@@ -129,14 +129,16 @@ def test_precision_is_mixed_only_where_the_cpu_computes_with_bfloat16(monkeypatc
     X, y = hits(40, side=32)
     network = voxnet(max_epochs=1, rows_per_epoch=32, pooling=2, mixed_precision=False).fit(X, y)
     full = network.decision_function(X)
-    answers = {}
+    answers, losses = {}, {}
     for instructions in ({}, {"avx512_bf16": False}, {"avx512_bf16": True}, {"bf16": True}):
         monkeypatch.setattr(torch.cpu, "get_capabilities", lambda found=instructions: found)
         mixed = voxnet(max_epochs=1, rows_per_epoch=32, pooling=2).fit(X, y)
         answers[any(instructions.values())] = mixed.decision_function(X)
+        losses[any(instructions.values())] = mixed.history_[0]["train_loss"]
         np.testing.assert_allclose(mixed.decision_function(X), full, atol=0.05)
     np.testing.assert_array_equal(answers[False], full)
     assert not np.array_equal(answers[True], full)
+    assert losses[False] == network.history_[0]["train_loss"] != losses[True]
 
 
 def test_a_model_on_disk_is_small_and_the_same(data, fitted, tmp_path):
