@@ -265,3 +265,9 @@ def test_the_network_has_the_papers_layers():
         (1, 128),
         (1,),
     ]
+
+
+@pytest.mark.parametrize(("pooling", "n_inputs"), [(1, 32 * 6**3), (2, 32 * 2**3)])
+def test_pooling_makes_the_network_smaller(pooling, n_inputs):
+    module = VoxNet(pooling=pooling).module(3 * 32**3 // 8, packed=True)
+    assert (128, n_inputs) in [tuple(parameter.shape) for parameter in module.parameters()]
