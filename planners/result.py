@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from reliability.archive import read_arrays, write_arrays
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 Array = NDArray[np.float64]
 
 
