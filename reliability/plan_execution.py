@@ -36,13 +36,13 @@ class Planner(Protocol):
 class PlanFailedError(RuntimeError):
     """Planning, executing or labelling a plan of a collection raised an exception.
 
-    Its cause is that exception.
-
-    Attributes
+    Parameters
     ----------
     facts : dict
         ``plan``, the plan's number; ``scene``; ``random_state``, the planner's; ``problem`` and
-        ``error``, in words.
+        ``error``, in words. Kept in the attribute of the same name.
+    cause : Exception
+        The exception itself, which becomes ``__cause__``.
     """
 
     def __init__(self, facts: dict[str, Any], cause: Exception) -> None:
