@@ -22,7 +22,10 @@ RUNS = {
         [r"no classifier +3 ", r"logistic regression +\d\d", r"calibrated network +\d\d"],
     ),
     "own_system.py": ({}, [r"without .* ends at \[1\.\d+ +3", r"with .* ends at \[0\.5 +3"]),
-    "own_scene.py": ({"N_PLANS": "4"}, ["are Unreliable", "Without .*plan", "With .*plan"]),
+    "own_scene.py": (
+        {"N_PLANS, N_TESTS": "40, 2"},
+        ["are Unreliable", "Without .* 0 of 2", r"With .* \d of 2"],
+    ),
     "arm.py": (
         {"N_PLANS": "150", "N_TESTS": "3"},
         ["of them Unreliable", r"Without .* in \d of 3", r"With .* in [23] of 3"],
