@@ -23,7 +23,7 @@ RUNS = {
     ),
     "own_system.py": ({}, [r"without .* ends at \[1\.\d+ +3", r"with .* ends at \[0\.5 +3"]),
     "own_scene.py": (
-        {"N_PLANS, N_TESTS": "40, 2"},
+        {"N_PLANS, N_TESTS": "24, 2"},
         ["are Unreliable", "Without .* 0 of 2", r"With .* \d of 2"],
     ),
     "arm.py": (
@@ -31,7 +31,7 @@ RUNS = {
         ["of them Unreliable", r"Without .* in \d of 3", r"With .* in [23] of 3"],
     ),
     "car.py": (
-        {"N_PLANS, N_TESTS": "(300, 60), 3"},
+        {"N_PLANS, N_TESTS": "(200, 40), 3"},
         ["round 2", r"Without .* in [01] of 3", r"With .* in \d of 3"],
     ),
     "rope.py": ({}, [r"Without .* gets caught.*stretch", "With .* passes. Every command was"]),
