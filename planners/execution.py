@@ -143,9 +143,8 @@ def execute(
     >>> from systems import PlanarArm
     >>> arm = PlanarArm()
     >>> planner = BiasedRRTConnect(arm, random_state=0)
-    >>> problem = arm.sample_problem(2)
-    >>> execute(arm, planner, problem, tolerance=0.1, max_replans=5).status.name
-    'REACHED'
+    >>> execute(arm, planner, arm.sample_problem(7), tolerance=0.1, max_replans=5)
+    Execution(REACHED, 37 commands, 2 replans)
     """
     check_number(tolerance, "tolerance", 0, np.inf)
     check_max_replans(max_replans)
