@@ -1,8 +1,15 @@
 from .check_transition import CheckTransition as CheckTransition
+from .comparison import Comparison as Comparison
 from .edge_checker import EdgeChecker as EdgeChecker
 from .edge_discretization import split_edges as split_edges
+from .evaluation import Evaluation as Evaluation
+from .execution import Execution as Execution
+from .execution import ExecutionStatus as ExecutionStatus
+from .execution import execute as execute
+from .planner_evaluation import evaluate as evaluate
 from .restarts import best_of_restarts as best_of_restarts
 from .result import PlanResult as PlanResult
 from .result import PlanStatus as PlanStatus
 from .rrt import BiasedRRT as BiasedRRT
 from .rrt_connect import BiasedRRTConnect as BiasedRRTConnect
+from .share import Share as Share

@@ -73,6 +73,13 @@ def _checked_starts(system: System, starts: Sequence[ArrayLike]) -> Array:
     return checked
 
 
+def can_start(system: System, reduced: Array) -> bool:
+    """Say whether planning may begin at a reduced state: it is in bounds, and g can stay there."""
+    configuration, (low, high) = reduced[: system.configuration_dim], system.bounds
+    within = bool(((configuration >= low) & (configuration <= high)).all())
+    return within and bool(_can_stay(system, reduced[None])[0])
+
+
 def _checked_goals(system: System, goals: ArrayLike) -> Array:
     checked = as_finite_array(np.atleast_2d(goals), "goal", (None, system.configuration_dim))
     if len(checked) == 0:

@@ -15,9 +15,9 @@ from reliability.plan_execution import (
     FAILED,
     LABELS,
     UNSOLVED,
-    PlanFailedError,
     Planner,
     PlanTask,
+    causes_restored,
     tell_failure,
 )
 from reliability.scenes import SceneArgument, SceneFamily
@@ -103,7 +103,7 @@ def collect_transitions(
     _check_choice(labels, "labels", LABELS)
     _check_choice(on_error, "on_error", _ON_ERROR)
     family = SceneFamily(system)
-    _check_belongs(planner, family)
+    family.check_planner(planner)
     seed, store = as_seed(random_state), None
     if path is not None:
         store = _open_store(path, family, planner, labels, seed, adopt=random_state is None)
@@ -121,15 +121,6 @@ def collect_transitions(
 def _check_choice(value: Any, name: str, choices: tuple[str, ...]) -> None:
     if value not in choices:
         raise ValueError(f"{name} must be one of {', '.join(choices)}, got {value!r}.")
-
-
-def _check_belongs(planner: Planner, family: SceneFamily) -> None:
-    own = getattr(planner, "system", None)
-    if own is not None and not family.has(own):
-        raise ValueError(
-            f"planner has the system {own!r}, which is not one of those to collect from. Make it "
-            "with one of these, or with None: each plan's system is set."
-        )
 
 
 def _open_store(
@@ -160,7 +151,7 @@ def _run(
     tasks: list[PlanTask], store: ResumableStore | None, n_jobs: int | None, verbose: int
 ) -> list[Item]:
     jobs = [Job(f"plan-{task.plan:07d}", task, store) for task in tasks]
-    try:
+    with causes_restored():
         items = run_jobs(jobs, n_jobs=n_jobs, verbose=verbose, unit="plan")
         failed = [job for job, item in zip(jobs, items, strict=True) if _has_failed(item)]
         if failed and store is not None and tasks[0].on_error == "raise":
@@ -168,10 +159,6 @@ def _run(
             for job in failed:
                 store.discard(job.name)
             items = run_jobs(jobs, n_jobs=n_jobs, verbose=verbose, unit="plan")
-    except PlanFailedError as error:
-        if error.__cause__ is not error.args[1]:  # the worker's traceback, as text
-            error.add_note(str(error.__cause__))
-        raise error from error.args[1]
     return items
 
 

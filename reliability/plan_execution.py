@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -34,7 +35,7 @@ class Planner(Protocol):
 
 
 class PlanFailedError(RuntimeError):
-    """Planning, executing or labelling a plan of a collection raised an exception.
+    """Planning, executing or labelling one of many plans raised an exception.
 
     Parameters
     ----------
@@ -51,8 +52,44 @@ class PlanFailedError(RuntimeError):
         # An exception that comes from another process has lost its cause.
         self.__cause__ = cause
 
+    @classmethod
+    def of(
+        cls, error: Exception, plan: int, scene: int, random_state: int, problem: Any
+    ) -> PlanFailedError:
+        """Make one of an exception, such that it can go to another process.
+
+        Parameters
+        ----------
+        error : Exception
+        plan, scene, random_state : int
+        problem : Problem or None
+            None if it had not been drawn.
+        """
+        words = "not drawn yet" if problem is None else repr(problem)
+        if len(words) > _LONGEST_PROBLEM:
+            words = f"{words[:_LONGEST_PROBLEM]}…"
+        facts = {
+            "plan": plan,
+            "scene": scene,
+            "random_state": random_state,
+            "problem": words,
+            "error": repr(error),
+        }
+        return cls(facts, _portable(error))
+
     def __str__(self) -> str:
         return tell_failure(self.facts)
+
+
+@contextlib.contextmanager
+def causes_restored() -> Iterator[None]:
+    """Raise a ``PlanFailedError`` of another process as one of this process, with its cause."""
+    try:
+        yield
+    except PlanFailedError as error:
+        if error.__cause__ is not error.args[1]:  # the worker's traceback, as text
+            error.add_note(str(error.__cause__))
+        raise error from error.args[1]
 
 
 def tell_failure(facts: dict[str, Any]) -> str:
@@ -108,10 +145,10 @@ class PlanTask:
         except SimulationDivergedError:
             return Item({"outcome": DIVERGED})
         except Exception as error:
-            facts = self._failure(error, problem, random_state)
+            failure = PlanFailedError.of(error, self.plan, self.scene, random_state, problem)
             if self.on_error == "raise":
-                raise PlanFailedError(facts, _portable(error)) from error
-            return Item({"outcome": FAILED, "failure": facts})
+                raise failure from error
+            return Item({"outcome": FAILED, "failure": failure.facts})
         if transitions is None:
             return Item({"outcome": UNSOLVED})
         facts = {"outcome": EXECUTED, "n_transitions": len(transitions)}
@@ -160,18 +197,6 @@ class PlanTask:
         plan, scene = np.full(len(y), self.plan), np.full(len(y), self.scene)
         executed = np.full(len(y), from_execution)
         return Transitions(reduced, command, next_reduced, y, plan, step, scene, executed)
-
-    def _failure(self, error: Exception, problem: Any, random_state: int) -> dict[str, Any]:
-        words = "not drawn yet" if problem is None else repr(problem)
-        if len(words) > _LONGEST_PROBLEM:
-            words = f"{words[:_LONGEST_PROBLEM]}…"
-        return {
-            "plan": self.plan,
-            "scene": self.scene,
-            "random_state": random_state,
-            "problem": words,
-            "error": repr(error),
-        }
 
 
 def _portable(error: Exception) -> Exception:

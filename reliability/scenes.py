@@ -58,14 +58,14 @@ class SceneFamily:
         """Whether there is only one system."""
         return isinstance(self._given, System)
 
-    def id_of_plan(self, plan: int, seed: int) -> int:
-        """Return the id of the scene that a plan of a collection with this seed is made in.
+    def id_of_plan(self, plan: int, seed: int, purpose: tuple[int, ...] = ()) -> int:
+        """Return the id of the scene that a plan with this seed and purpose is made in.
 
         The systems of a sequence take turns. To a callable each plan's scene is a new one.
         """
         if self._systems is not None:
             return plan % len(self._systems)
-        of_scene = plan_seeds(seed, plan)[2]
+        of_scene = plan_seeds(seed, plan, purpose)[2]
         # Ids are stored as int64.
         return int(of_scene.generate_state(1, np.uint64)[0] >> np.uint64(1))
 
@@ -113,6 +113,15 @@ class SceneFamily:
         code = {kind.__qualname__: code_digest(kind) for kind in kinds}
         return {"system": described[0] if self.is_single else described, "code": code}
 
+    def check_planner(self, planner: Any) -> None:
+        """Raise ``ValueError`` if a planner has a system that is not one of the family."""
+        own = getattr(planner, "system", None)
+        if own is not None and not self.has(own):
+            raise ValueError(
+                f"planner has the system {own!r}, which is not one of those that system gives. "
+                "Make it with one of these, or with None: each plan's system is set."
+            )
+
     def has(self, system: System) -> bool:
         """Say whether a system is one of the family, as far as can be told.
 
@@ -126,6 +135,15 @@ class SceneFamily:
         return bool(alike) and describe(system) in [describe(one) for one in alike]
 
 
-def plan_seeds(seed: int, plan: int) -> list[np.random.SeedSequence]:
-    """Return the seeds of a plan's problem, of its planner and of its scene."""
-    return np.random.SeedSequence(seed, spawn_key=(plan,)).spawn(3)
+def plan_seeds(seed: int, plan: int, purpose: tuple[int, ...] = ()) -> list[np.random.SeedSequence]:
+    """Return the seeds of a plan's problem, of its planner and of its scene.
+
+    Parameters
+    ----------
+    seed : int
+    plan : int
+        The plan's number.
+    purpose : tuple of int, default=()
+        Plans for another purpose than collection, such as evaluation, have other seeds.
+    """
+    return np.random.SeedSequence(seed, spawn_key=(*purpose, plan)).spawn(3)

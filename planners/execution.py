@@ -1,0 +1,283 @@
+"""Carrying out a plan, and planning again where the system leaves it."""
+
+from __future__ import annotations
+
+import copy
+import time
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.distrust import DistrustedTransitions
+from planners.planning_problem import can_start
+from reliability.scenes import SceneFamily
+from systems.errors import SimulationDivergedError
+from systems.system import Array, Problem, System
+from systems.validation import as_seed, check_number, is_integer
+
+
+class ExecutionStatus(Enum):
+    """How an execution ended; each value says what to do about it."""
+
+    REACHED = "The system is within the tolerance of the goal."
+    NO_PLAN = (
+        "No plan was found from where the system was when it was made. The last plan's status "
+        "says what to do about it."
+    )
+    MISSED = (
+        "The system is Close to the end of its plan, and yet not within the tolerance of the goal. "
+        "Ask for a larger tolerance, or make the system's close and goal_reached narrower."
+    )
+    CONSTRAINT = (
+        "The system stopped at the boundary of a constraint, and no replan was left; stop_reason "
+        "says which. Allow more replans (max_replans), or plan with an estimator."
+    )
+    START_NOT_ALLOWED = (
+        "The system left its plan and was where no plan may start: out of the system's bounds, or "
+        "where propagate is not valid even for standing still. Make bounds and propagate allow "
+        "what the true system can come to, or plan with an estimator that keeps away from there."
+    )
+    LEFT_PLAN = (
+        "The system left its plan when no replan was left, and the rest of the plan did not lead "
+        "to the goal. Allow more replans (max_replans), or plan with an estimator."
+    )
+    SIMULATION_DIVERGED = (
+        "The simulator diverged, so what came next is not known. Look at the last state and the "
+        "plan's command there; simulate in smaller steps if they are harmless."
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Execution:
+    """What a system did, which plans it followed, and why that ended.
+
+    Attributes
+    ----------
+    status : ExecutionStatus
+    stop_reason : Enum or None
+        That of the last rollout; None if nothing was carried out.
+    states : list of states
+        The true start, and the true state after each command.
+    commands : ndarray of shape (len(states) - 1, command_dim)
+        Commands that were given; where the system stopped at the boundary of a constraint, the
+        one under way too.
+    plans : list of PlanResult
+        All that were made, in order. Without ``success``, the last one was not carried out.
+    plan_starts : list of int
+        For each plan, the number of the state from which it was made.
+    planning_time : float
+        Seconds that all plans took together.
+    """
+
+    status: ExecutionStatus
+    stop_reason: Enum | None
+    states: list[Any]
+    commands: Array
+    plans: list[Any]
+    plan_starts: list[int]
+    planning_time: float
+
+    @property
+    def success(self) -> bool:
+        """Whether the system is within the tolerance of the goal."""
+        return self.status is ExecutionStatus.REACHED
+
+    @property
+    def n_replans(self) -> int:
+        """How many plans were made after the first."""
+        return len(self.plans) - 1
+
+    def __repr__(self) -> str:
+        return (
+            f"Execution({self.status.name}, {len(self.commands)} commands, "
+            f"{self.n_replans} replans)"
+        )
+
+
+def execute(
+    system: System, planner: Any, problem: Problem, *, tolerance: float, max_replans: int = 0
+) -> Execution:
+    """Plan, carry the plan out, and plan again where the system leaves it.
+
+    As long as replans are left, the plan is carried out command by command. If a reduced state is
+    not Close to the planned one, if the system stops at the boundary of a constraint, or if the
+    plan ends and the goal is missed, a new plan is made from the true state. The transition that
+    failed is not used again near that place in this execution: for new plans, g has no successor
+    where a transition begins Close to it with about the same motion.
+
+    If no new plan is found, or none may start there, the rest of the old one is carried out, as
+    without replans. So is the last plan, to its end, once all replans are used up.
+
+    Parameters
+    ----------
+    system : System
+    planner : BiasedRRT, BiasedRRTConnect or alike
+        A template: copies are given the system and a seed, the first one that of
+        ``planner.random_state``. Its own system must be this one or None.
+    problem : Problem
+    tolerance : float
+        How near to the goal the true state has to come, as :meth:`systems.System.succeeded`
+        takes it.
+    max_replans : int, default=0
+        Plans to make after the first. 0 carries one plan out to its end, whatever happens.
+
+    Returns
+    -------
+    Execution
+
+    Raises
+    ------
+    ValueError
+        If an argument is unfit, or the planner refuses the problem.
+
+    References
+    ----------
+    Vemula et al. 2020 (CMAX), for distrusting transitions that failed.
+
+    Examples
+    --------
+    >>> from planners import BiasedRRTConnect, execute
+    >>> from systems import PlanarArm
+    >>> arm = PlanarArm()
+    >>> planner = BiasedRRTConnect(arm, random_state=0)
+    >>> execute(arm, planner, arm.sample_problem(7), tolerance=0.1, max_replans=5)
+    Execution(REACHED, 37 commands, 2 replans)
+    """
+    check_number(tolerance, "tolerance", 0, np.inf)
+    check_max_replans(max_replans)
+    SceneFamily(system).check_planner(planner)
+    run = _Run(system, planner, problem, float(tolerance))
+    try:
+        status = run.to_the_end(int(max_replans))
+    except SimulationDivergedError:
+        status = ExecutionStatus.SIMULATION_DIVERGED
+    return run.ended(status)
+
+
+def check_max_replans(value: Any) -> None:
+    """Raise ``ValueError`` unless a value is a number of replans."""
+    if not is_integer(value) or value < 0:
+        raise ValueError(f"max_replans must be an integer of at least 0, got {value!r}.")
+
+
+@dataclass(eq=False)
+class _Run:
+    """An execution under way."""
+
+    system: System
+    planner: Any
+    problem: Problem
+    tolerance: float
+    states: list[Any] = field(init=False)
+    commands: list[Array] = field(default_factory=list)
+    plans: list[Any] = field(default_factory=list)
+    plan_starts: list[int] = field(default_factory=list)
+    planning_time: float = 0.0
+    stop_reason: Enum | None = None
+
+    def __post_init__(self) -> None:
+        self.states = [self.problem.start]
+        self._distrusted = DistrustedTransitions(self.system)
+        self._seed = as_seed(getattr(self.planner, "random_state", None))
+        self._remaining: NDArray[Any] = np.empty((0, 0))
+
+    def to_the_end(self, max_replans: int) -> ExecutionStatus:
+        self._plan()
+        if not self.plans[0].success:
+            return ExecutionStatus.NO_PLAN
+        for _ in range(max_replans):
+            self._follow()
+            if self._arrived():
+                return ExecutionStatus.REACHED
+            hindrance = self._replan()
+            if hindrance is not None:
+                return self._finish(hindrance)
+        return self._finish(None)
+
+    def ended(self, status: ExecutionStatus) -> Execution:
+        commands = np.array(self.commands) if self.commands else self.plans[0].commands[:0]
+        return Execution(
+            status,
+            self.stop_reason,
+            self.states,
+            commands,
+            self.plans,
+            self.plan_starts,
+            self.planning_time,
+        )
+
+    def _plan(self) -> bool:
+        """Plan from where the system is; return whether there is a plan to carry out."""
+        planner = copy.copy(self.planner)
+        planner.system = self._distrusted.left_out_of(self.system)
+        planner.random_state = self._seed_of_plan(len(self.plans))
+        began = time.perf_counter()
+        plan = planner.plan(self._reduced(), self.problem.goal)
+        self.planning_time += time.perf_counter() - began
+        self.plans.append(plan)
+        self.plan_starts.append(len(self.states) - 1)
+        if plan.success:
+            self._remaining = plan.commands
+        return bool(plan.success)
+
+    def _replan(self) -> ExecutionStatus | None:
+        """Plan anew; return why that was not possible or did not help, or None."""
+        if not can_start(self.system, self._reduced()):
+            return ExecutionStatus.START_NOT_ALLOWED
+        if not self._plan():
+            return ExecutionStatus.NO_PLAN
+        return None if len(self._remaining) else ExecutionStatus.MISSED
+
+    def _follow(self) -> None:
+        """Carry the plan out until the system leaves it, or to its end."""
+        plan = self.plans[-1]
+        for planned, following in zip(plan.reduced[:-1], plan.reduced[1:], strict=True):
+            before, command = self._reduced(), self._remaining[:1]
+            completed = self._give(command)
+            if not (completed and self.system.close(following[None], self._reduced()[None])[0]):
+                self._distrust(before, command, (planned, following))
+                return
+
+    def _finish(self, hindrance: ExecutionStatus | None) -> ExecutionStatus:
+        """Carry out what remains of the plan; return how it ended, or what kept from replanning."""
+        stopped = len(self._remaining) and not self._give(self._remaining)
+        if self._arrived():
+            return ExecutionStatus.REACHED
+        if hindrance is not None:
+            return hindrance
+        if stopped:
+            return ExecutionStatus.CONSTRAINT
+        end = self.plans[-1].reduced[-1:]
+        missed = self.system.close(end, self._reduced()[None])[0]
+        return ExecutionStatus.MISSED if missed else ExecutionStatus.LEFT_PLAN
+
+    def _give(self, commands: Array) -> bool:
+        """Have commands carried out; return whether all were, and forget the rest otherwise."""
+        rollout = self.system.rollout(self.states[-1], commands)
+        states = list(rollout.states)[1:]
+        self.states.extend(states)
+        self.commands.extend(commands[: len(states)])
+        self.stop_reason = rollout.stop_reason
+        completed = bool(rollout.n_completed == len(commands))
+        self._remaining = self._remaining[len(commands) if completed else len(self._remaining) :]
+        return completed
+
+    def _distrust(self, before: Array, command: Array, planned: tuple[Array, Array]) -> None:
+        """Remember what g predicts from where the system was, or else what was planned."""
+        following, valid = self.system.propagate(before[None], command)
+        self._distrusted.add(*((before, following[0]) if valid[0] else planned))
+
+    def _arrived(self) -> bool:
+        return bool(self.system.succeeded(self.states[-1], self.problem.goal, self.tolerance))
+
+    def _reduced(self) -> Array:
+        return self.system.reduce(self.states[-1])
+
+    def _seed_of_plan(self, number: int) -> int:
+        if number == 0:
+            return self._seed
+        seeds = np.random.SeedSequence(self._seed, spawn_key=(number,))
+        return int(seeds.generate_state(1)[0])
