@@ -1,6 +1,7 @@
 """Learning in rounds: the same however it was cut up, and reports that say what is true."""
 
 import shutil
+from dataclasses import replace
 from math import comb
 
 import numpy as np
@@ -16,7 +17,7 @@ from sklearn.tree import DecisionTreeClassifier
 from test_transitions import assert_equal
 from toy_systems import Disc
 
-from planners import BiasedRRTConnect
+from planners import BiasedRRTConnect, PlanStatus
 from reliability import (
     RELIABLE,
     UNRELIABLE,
@@ -281,6 +282,27 @@ def test_a_round_that_brings_nothing_is_the_last():
     assert "Stopped early" in str(result)
     assert "not more, beyond chance" in str(report)
     assert not learn(Constant(RELIABLE), n_rounds=2).stopped_early
+
+
+class GivesUp(BiasedRRTConnect):
+    """Solves few problems without an estimator."""
+
+    def plan(self, start_reduced, goal):
+        result = super().plan(start_reduced, goal)
+        gives_up = self.estimator is None and start_reduced[1] > -0.5
+        return replace(result, status=PlanStatus.ITERATION_LIMIT) if gives_up else result
+
+
+def test_it_goes_on_as_long_as_more_plans_succeed():
+    planner = GivesUp(None, max_iterations=300)
+    result = learn_in_rounds(
+        Constant(RELIABLE), planner, Disc(), n_rounds=4, n_plans=50, random_state=0
+    )
+    assert [report.success_improved for report in result.rounds] == [None, True, False]
+    assert [report.accuracy_improved for report in result.rounds] == [None, False, False]
+    for report, before in zip(result.rounds[1:], result.rounds[:-1], strict=True):
+        assert report.success_improved == (p_value_of_successes(report, before) < 0.05)
+    assert result.stopped_early
 
 
 def test_a_round_without_a_plan_brings_nothing():
