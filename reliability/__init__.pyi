@@ -12,10 +12,13 @@ from .labels import UNRELIABLE as UNRELIABLE
 from .labels import ExecutedTransitions as ExecutedTransitions
 from .labels import label_executed_transitions as label_executed_transitions
 from .labels import label_transitions as label_transitions
+from .learning import LearningResult as LearningResult
+from .learning import learn_in_rounds as learn_in_rounds
 from .persistence import ModelFileError as ModelFileError
 from .persistence import load_estimator as load_estimator
 from .plan_execution import PlanFailedError as PlanFailedError
 from .reachable_code import code_digest as code_digest
+from .round_report import RoundReport as RoundReport
 from .store import Job as Job
 from .store import ResumableStore as ResumableStore
 from .store import run_jobs as run_jobs

@@ -99,9 +99,42 @@ def collect_transitions(
     ----------
     McConachie et al. 2020, "Data Generation and Labeling".
     """
+    items = execute_plans(
+        system,
+        planner,
+        n_plans,
+        labels=labels,
+        on_error=on_error,
+        n_jobs=n_jobs,
+        random_state=random_state,
+        path=path,
+        verbose=verbose,
+    )
+    return joined(items, verbose)
+
+
+def execute_plans(
+    system: SceneArgument,
+    planner: Planner,
+    n_plans: int,
+    *,
+    labels: str,
+    on_error: str = "raise",
+    n_jobs: int | None,
+    random_state: RandomState,
+    path: str | os.PathLike[str] | None,
+    verbose: int,
+) -> list[Item]:
+    """Do the work of :func:`collect_transitions`, and return what became of each plan.
+
+    Returns
+    -------
+    items : list of Item
+        One per plan, as :class:`reliability.plan_execution.PlanTask` makes them.
+    """
     check_count(n_plans, "n_plans")
-    _check_choice(labels, "labels", LABELS)
-    _check_choice(on_error, "on_error", _ON_ERROR)
+    check_choice(labels, "labels", LABELS)
+    check_choice(on_error, "on_error", _ON_ERROR)
     family = SceneFamily(system)
     family.check_planner(planner)
     seed, store = as_seed(random_state), None
@@ -114,11 +147,11 @@ def collect_transitions(
         PlanTask(*_source(family, seed, i), template, labels, on_error, seed, i)
         for i in range(int(n_plans))
     ]
-    items = _run(tasks, store, n_jobs, verbose)
-    return _joined(items, verbose)
+    return _run(tasks, store, n_jobs, verbose)
 
 
-def _check_choice(value: Any, name: str, choices: tuple[str, ...]) -> None:
+def check_choice(value: Any, name: str, choices: tuple[str, ...]) -> None:
+    """Raise ``ValueError`` unless a value is one of some choices."""
     if value not in choices:
         raise ValueError(f"{name} must be one of {', '.join(choices)}, got {value!r}.")
 
@@ -166,7 +199,14 @@ def _has_failed(item: Item) -> bool:
     return bool(item.facts["outcome"] == FAILED)
 
 
-def _joined(items: list[Item], verbose: int) -> Transitions:
+def joined(items: list[Item], verbose: int) -> Transitions:
+    """Return the transitions of all plans, and warn of those that failed or diverged.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
     outcomes = Counter(item.facts["outcome"] for item in items)
     if outcomes[DIVERGED]:
         warnings.warn(

@@ -130,6 +130,9 @@ class PlanTask:
     def __call__(self) -> Item:
         """Return the transitions, or what became of the plan instead.
 
+        Of an executed plan, the fact "succeeded" says whether the execution came to its end, and
+        ended close to where the plan does.
+
         Raises
         ------
         PlanFailedError
@@ -141,7 +144,7 @@ class PlanTask:
         try:
             system = SceneFamily(self.source).system(self.scene)
             problem = system.sample_problem(problem_seed)
-            transitions = self._transitions(system, problem, random_state)
+            return self._item(system, problem, random_state)
         except SimulationDivergedError:
             return Item({"outcome": DIVERGED})
         except Exception as error:
@@ -149,19 +152,13 @@ class PlanTask:
             if self.on_error == "raise":
                 raise failure from error
             return Item({"outcome": FAILED, "failure": failure.facts})
-        if transitions is None:
-            return Item({"outcome": UNSOLVED})
-        facts = {"outcome": EXECUTED, "n_transitions": len(transitions)}
-        return Item(facts, transitions.to_arrays())
 
-    def _transitions(
-        self, system: System, problem: Problem, random_state: int
-    ) -> Transitions | None:
+    def _item(self, system: System, problem: Problem, random_state: int) -> Item:
         planner = copy.copy(self.planner)
         planner.system, planner.random_state = system, random_state
         plan = planner.plan(system.reduce(problem.start), problem.goal)
         if not plan.success:
-            return None
+            return Item({"outcome": UNSOLVED})
         rollout = system.rollout(problem.start, plan.commands)
         executed = np.array([system.reduce(state) for state in rollout.states])
         parts = []
@@ -169,7 +166,14 @@ class PlanTask:
             parts.append(self._of_plan(system, plan, executed))
         if self.labels != "plan":
             parts.append(self._of_execution(system, plan, executed))
-        return join(parts)
+        transitions = join(parts)
+        facts = {
+            "outcome": EXECUTED,
+            "n_transitions": len(transitions),
+            "succeeded": rollout.n_completed == len(plan.commands)
+            and bool(system.close(plan.reduced[-1:], executed[-1:])[0]),
+        }
+        return Item(facts, transitions.to_arrays())
 
     def _of_plan(self, system: System, plan: Any, executed: Array) -> Transitions:
         """Label the plan's own transitions; those that the execution never came to are left out."""

@@ -1,0 +1,148 @@
+"""What a round of learning brought, in numbers, and whether it was more than chance."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import fisher_exact, ttest_1samp
+
+from reliability.item_files import Item
+from reliability.plan_execution import DIVERGED, EXECUTED
+
+# A difference counts as more than chance if chance makes one as large this rarely.
+SIGNIFICANCE = 0.05
+
+
+@dataclass(frozen=True)
+class RoundReport:
+    """What became of a round's plans, and how good the estimators before and after it are.
+
+    Rows that are not learned from (see ``n_after`` of :func:`reliability.learn_in_rounds`) are
+    left out of all accuracies. Balanced accuracy is the mean of the shares of Reliable and of
+    Unreliable transitions that are labelled right; guessing gives 0.5, whatever the labels;
+    it is NaN where a label is missing.
+
+    Attributes
+    ----------
+    round : int
+        From 0.
+    n_plans, n_solved, n_succeeded : int
+        Problems of the round; those that were solved; those whose execution also came to its end,
+        Close to where the plan ends.
+    n_transitions : int
+        Transitions of the round, all of them.
+    n_learned : int
+        Rows that the estimator is fitted on at the end of this round, of all rounds so far.
+    base_rate : float
+        Share of the more frequent label among the round's rows: the accuracy of an estimator
+        that always gives the same answer. NaN without rows.
+    unseen_balanced_accuracy : float
+        Of the estimator that the round's plans were made with, on the round's rows. The planner
+        leaves out most of what this estimator calls Unreliable, so that its plans show above all
+        where it is wrong: near 0.5 does not make it a bad estimator. NaN in round 0.
+    updated_balanced_accuracy : float
+        On the same rows, of copies that were fitted on the earlier rounds and on other plans of
+        this one. What it is above the one before is what the round taught.
+    cross_validated_balanced_accuracy : float
+        Of such copies on the rows of all rounds so far.
+    p_acc : float
+        The new estimator's ``validation_accuracy_``.
+    success_improved : bool or None
+        Whether more of the round's plans succeeded than of the round before, beyond chance
+        (Fisher's exact test at 5 %). None in round 0.
+    accuracy_improved : bool or None
+        Whether ``updated_balanced_accuracy`` is above ``unseen_balanced_accuracy``, beyond chance
+        (t-test over plans at 5 %). As the plans show above all where the earlier estimator is
+        wrong, this rather goes on once too often than stops too early. None in round 0.
+    seconds : float
+        Spent on the round by this call; next to nothing for a round that was read.
+    """
+
+    round: int
+    n_plans: int
+    n_solved: int
+    n_succeeded: int
+    n_transitions: int
+    n_learned: int
+    base_rate: float
+    unseen_balanced_accuracy: float
+    updated_balanced_accuracy: float
+    cross_validated_balanced_accuracy: float
+    p_acc: float
+    success_improved: bool | None
+    accuracy_improved: bool | None
+    seconds: float
+
+    @property
+    def brought_nothing(self) -> bool:
+        """Whether neither success nor balanced accuracy rose beyond chance; not of round 0."""
+        return self.round > 0 and not (self.success_improved or self.accuracy_improved)
+
+    def __str__(self) -> str:
+        """Return the numbers in three lines."""
+        return (
+            f"Round {self.round}: {self.n_solved} of {self.n_plans} problems solved, "
+            f"{self.n_succeeded} succeeded{_told(self.success_improved)}; "
+            f"{self.n_transitions:,} transitions, {self.n_learned:,} to learn from so far; "
+            f"{self.seconds:.0f} s.\n"
+            f"  Balanced accuracy on its plans: {self.unseen_balanced_accuracy:.3f} before, "
+            f"{self.updated_balanced_accuracy:.3f} with what they taught"
+            f"{_told(self.accuracy_improved)}; base rate {self.base_rate:.3f}.\n"
+            f"  On all plans so far: balanced accuracy "
+            f"{self.cross_validated_balanced_accuracy:.3f}, p_acc {self.p_acc:.3f}."
+        )
+
+
+@dataclass(frozen=True)
+class PlanCounts:
+    """How many of a round's plans were made, solved, and executed with success."""
+
+    n_plans: int
+    n_solved: int
+    n_succeeded: int
+
+    @classmethod
+    def of(cls, items: Sequence[Item]) -> PlanCounts:
+        """Count what became of plans."""
+        outcomes = Counter(item.facts["outcome"] for item in items)
+        n_succeeded = sum(bool(item.facts.get("succeeded")) for item in items)
+        return cls(len(items), outcomes[EXECUTED] + outcomes[DIVERGED], n_succeeded)
+
+    def more_succeeded_than(self, before: PlanCounts) -> bool:
+        """Say whether the share of successes is greater than before, beyond chance."""
+        table = [[one.n_succeeded, one.n_plans - one.n_succeeded] for one in (self, before)]
+        return bool(fisher_exact(table, alternative="greater").pvalue < SIGNIFICANCE)
+
+
+def is_better(
+    right: NDArray[np.bool_],
+    right_before: NDArray[np.bool_],
+    y: NDArray[np.int64],
+    plan: NDArray[np.int64],
+) -> bool:
+    """Say whether balanced accuracy is higher than before on the same rows, beyond chance.
+
+    Each plan's share of the difference is one observation, since rows of one plan are alike.
+
+    Parameters
+    ----------
+    right, right_before : ndarray of bool of shape (n,)
+        Which rows are labelled right.
+    y, plan : ndarray of int of shape (n,)
+    """
+    if len(np.unique(y)) < 2:
+        return False
+    difference = right.astype(float) - right_before
+    _, number = np.unique(plan, return_inverse=True)
+    shares = np.bincount(number, difference / np.bincount(y)[y])
+    if np.ptp(shares) == 0:
+        return False
+    return bool(ttest_1samp(shares, 0, alternative="greater").pvalue < SIGNIFICANCE)
+
+
+def _told(improved: bool | None) -> str:
+    return {None: "", True: " (more, beyond chance)", False: " (not more, beyond chance)"}[improved]
