@@ -69,7 +69,7 @@ def warn_if_no_better_than_base_rate(
     groups: ArrayLike,
     weight: NDArray[np.float64],
 ) -> None:
-    """Warn of an accuracy that says nothing, where enough rows were held out to tell.
+    """Warn of an accuracy that says nothing, where enough plans were held out to tell.
 
     A classifier that was trained to see both labels alike often has an accuracy below the base
     rate, and is useful nevertheless: it is told by its balanced accuracy.

@@ -215,7 +215,8 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         Warns
         -----
         BaseRateWarning
-            If many rows are held out and predicted no better than by one label for all of them.
+            If groups are given, and many of them are held out and predicted no better than by one
+            label for all rows.
         """
         # Importing torch takes a second, which making and loading a classifier need not pay.
         from reliability.networks.batches import LabelledRows
@@ -239,12 +240,11 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         validated = held_out.select(held_out.index[weight[held_out.index] > 0])
         right = self._is_right(validated)
         self.validation_accuracy_ = weighted_share(right, weight[validated.index])
-        warn_if_no_better_than_base_rate(
-            target[validated.index],
-            right,
-            validated.index if groups is None else np.asarray(groups)[validated.index],
-            weight[validated.index],
-        )
+        if groups is not None:
+            plans = np.asarray(groups)[validated.index]
+            warn_if_no_better_than_base_rate(
+                target[validated.index], right, plans, weight[validated.index]
+            )
         self._format_version = FORMAT_VERSION
         self._package_versions = {name: version(name) for name in STAMPED_PACKAGES}
         return self

@@ -55,6 +55,12 @@ def test_fit_says_nothing_where_too_little_is_held_out(rng):
         fit(data)
 
 
+def test_fit_says_nothing_where_plans_are_not_told_apart(rng):
+    data = pushed_box(rng, n_plans=260)
+    network = TransitionReliabilityClassifier(max_epochs=1, random_state=0)
+    network.fit(data.reduced, data.y)
+
+
 def test_rows_of_no_weight_count_in_no_accuracy(rng):
     """Half of the rows have random labels, and weigh nothing."""
     data = executed_steps(rng, n_plans=300)

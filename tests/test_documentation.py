@@ -21,7 +21,8 @@ PACKAGES = (systems, reliability, planners)
 
 
 @pytest.mark.parametrize(
-    "module", ["reliability.classifier", "planners.rrt", "planners.rrt_connect"]
+    "module",
+    ["reliability.classifier", "reliability.diagnosis", "planners.rrt", "planners.rrt_connect"],
 )
 def test_docstring_examples_run(module):
     results = doctest.testmod(importlib.import_module(module))
