@@ -1,8 +1,11 @@
 from .backends import MLP as MLP
 from .backends import VoxNet as VoxNet
+from .base_rate import BaseRateWarning as BaseRateWarning
 from .boosting import FastHistGradientBoostingClassifier as FastHistGradientBoostingClassifier
 from .classifier import TransitionReliabilityClassifier as TransitionReliabilityClassifier
 from .collect import collect_transitions as collect_transitions
+from .diagnosis import Diagnosis as Diagnosis
+from .diagnosis import diagnose as diagnose
 from .fast_inference.compiling import compile_inference as compile_inference
 from .identity import describe as describe
 from .item_files import Item as Item

@@ -14,6 +14,7 @@ from sklearn.base import BaseEstimator, ClassifierMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from reliability.backends import Backend, as_backend
+from reliability.base_rate import warn_if_no_better_than_base_rate, weighted_share
 from reliability.networks.constant_inference import ConstantInference
 from reliability.networks.hyperparameters import Hyperparameters
 from reliability.networks.voxel_format import check_packed
@@ -210,6 +211,12 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
             If ``checkpoint`` is damaged, or a file of another training.
         FloatingPointError
             If the loss stops being finite.
+
+        Warns
+        -----
+        BaseRateWarning
+            If groups are given, and many of them are held out and predicted no better than by one
+            label for all rows.
         """
         # Importing torch takes a second, which making and loading a classifier need not pay.
         from reliability.networks.batches import LabelledRows
@@ -230,7 +237,14 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         self._inference, self.history_ = self._train(
             backend, hyperparameters, training, held_out, rng
         )
-        self.validation_accuracy_ = self._accuracy(held_out)
+        validated = held_out.select(held_out.index[weight[held_out.index] > 0])
+        right = self._is_right(validated)
+        self.validation_accuracy_ = weighted_share(right, weight[validated.index])
+        if groups is not None:
+            plans = np.asarray(groups)[validated.index]
+            warn_if_no_better_than_base_rate(
+                target[validated.index], right, plans, weight[validated.index]
+            )
         self._format_version = FORMAT_VERSION
         self._package_versions = {name: version(name) for name in STAMPED_PACKAGES}
         return self
@@ -365,14 +379,12 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         weights, history = train(task)
         return backend.inference(self.n_features_in_, self._packed, weights), history
 
-    def _accuracy(self, data: LabelledRows) -> float:
-        """Return the share of rows that are predicted right, by weight; NaN if there are none."""
-        total = data.sample_weight[data.index].sum()
-        if total == 0:
-            return float("nan")
-        right = 0.0
+    def _is_right(self, data: LabelledRows) -> NDArray[np.bool_]:
+        """Say of each row whether its label is predicted."""
+        right = np.empty(len(data), dtype=np.bool_)
         # Some at a time, as X may be a file larger than memory.
-        for part in np.array_split(data.index, -(-len(data) // _ROWS_AT_ONCE)):
+        for begin in range(0, len(data), _ROWS_AT_ONCE):
+            part = data.index[begin : begin + _ROWS_AT_ONCE]
             positive = self._inference.logits(data.rows[part], self.device) > 0
-            right += data.sample_weight[part][positive == data.target[part]].sum()
-        return float(right / total)
+            right[begin : begin + _ROWS_AT_ONCE] = positive == data.target[part]
+        return right

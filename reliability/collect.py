@@ -76,7 +76,8 @@ def collect_transitions(
         folder.
     verbose : int, default=0
         1 shows a progress bar that counts plans, and prints a
-        :class:`reliability.summary.Summary`, which can also be drawn.
+        :class:`reliability.summary.Summary`, which can also be drawn, and the first of its
+        ``warnings``, if there are any.
 
     Returns
     -------
@@ -235,5 +236,8 @@ def joined(items: list[Item], verbose: int) -> Transitions:
         )
     transitions = join(parts)
     if verbose:
-        print(f"{Summary.of(transitions)}\nOf {len(items):,} plans {counts}")
+        summary = Summary.of(transitions)
+        print(f"{summary}\nOf {len(items):,} plans {counts}")
+        for warning in summary.warnings[:1]:
+            print(f"Warning: {warning}")
     return transitions

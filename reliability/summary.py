@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reliability.advice import label_warnings
 from reliability.labels import UNRELIABLE
 from reliability.transitions import Transitions
 
@@ -21,11 +22,15 @@ class Summary:
     n_transitions : int
     n_plans : int
         Plans that gave a transition.
+    n_plans_of_rarer_label : int
+        Plans that gave the less frequent one of the two labels.
     unreliable_share : float
         Of all transitions.
     divergence_onset_share : float
         Share of the Unreliable transitions at which an execution diverges from its plan; the
         others come after. NaN without any Unreliable one.
+    executed_share : float
+        Share of the transitions that are labelled from executed states.
     reliable_plan_share : float
         Share of the plans whose transitions are all Reliable.
     transitions_per_plan : ndarray of int of shape (n_plans,)
@@ -35,8 +40,10 @@ class Summary:
 
     n_transitions: int
     n_plans: int
+    n_plans_of_rarer_label: int
     unreliable_share: float
     divergence_onset_share: float
+    executed_share: float
     reliable_plan_share: float
     transitions_per_plan: NDArray[np.int64]
     reliable_before_divergence: NDArray[np.int64]
@@ -56,16 +63,34 @@ class Summary:
         np.minimum.at(first, number[unreliable], transitions.step[unreliable])
         spoilt = np.isin(np.arange(len(plans)), number[unreliable])
         n_unreliable = int(unreliable.sum())
+        rarer = unreliable if 2 * n_unreliable <= len(unreliable) else ~unreliable
         n_first = int(transitions.divergence_onsets().sum())
         return cls(
             n_transitions=len(transitions),
             n_plans=len(plans),
+            n_plans_of_rarer_label=len(np.unique(number[rarer])),
             unreliable_share=float(unreliable.mean()),
             divergence_onset_share=n_first / n_unreliable if n_unreliable else float("nan"),
+            executed_share=float(transitions.executed.mean()),
             reliable_plan_share=float(1 - spoilt.mean()),
             transitions_per_plan=sizes,
             reliable_before_divergence=first[spoilt],
         )
+
+    @property
+    def base_rate(self) -> float:
+        """Share of the more frequent label: the accuracy of predicting it for every transition."""
+        return max(self.unreliable_share, 1 - self.unreliable_share)
+
+    @property
+    def already_diverged_share(self) -> float:
+        """Share of the Unreliable transitions that come after their plan's execution diverged."""
+        return 1 - self.divergence_onset_share
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the labels alone show to be wrong, most important first, each with a remedy."""
+        return label_warnings(self)
 
     def __str__(self) -> str:
         """Return the numbers in a few lines."""

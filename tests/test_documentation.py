@@ -24,6 +24,7 @@ PACKAGES = (systems, reliability, planners)
     "module",
     [
         "reliability.classifier",
+        "reliability.diagnosis",
         "planners.execution",
         "planners.planner_evaluation",
         "planners.rrt",

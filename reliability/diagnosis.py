@@ -1,0 +1,297 @@
+"""What one wants to know of labels, features and an estimator before planning with it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.frozen import FrozenEstimator
+
+from reliability.advice import diagnosis_warnings
+from reliability.base_rate import beats_base_rate
+from reliability.calibration_curve import CalibrationCurve
+from reliability.classifier import TransitionReliabilityClassifier
+from reliability.diagnosis_plot import draw_diagnosis
+from reliability.feature_columns import constant_columns, duplicate_columns, unscaled_columns
+from reliability.labels import RELIABLE
+from reliability.scenes import SceneArgument
+from reliability.summary import Summary
+from reliability.transitions import Transitions
+from reliability.unseen_plans import UnseenPredictions, predict_unseen
+from systems.validation import check_count
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis:
+    """What labels, features and an estimator are worth, judged on whole plans it has not seen.
+
+    ``str`` gives a table. A number that can't be told is NaN: what predictions are worth if all
+    labels are the same or there is only one plan, probabilities of an estimator that gives none.
+
+    Attributes
+    ----------
+    labels : Summary
+        What the labels are, with ``labels.base_rate`` and ``labels.already_diverged_share``.
+    n_folds : int or None
+        Parts that the plans were split into; 0 if the estimator was judged as it is (a
+        FrozenEstimator), None if it could not be judged.
+    accuracy : float
+        Share of transitions whose label is predicted.
+    beats_base_rate : bool
+        Whether ``accuracy`` is greater than ``base_rate`` by more than chance.
+    balanced_accuracy : float
+        Mean of the recalls of both labels; 0.5 is chance.
+    reliable_recall, unreliable_recall : float
+        Share of the transitions with this label for which it is predicted.
+    onset_recall : float
+        Share of the divergence onsets (:meth:`Transitions.divergence_onsets`) that are predicted
+        to be Unreliable. Only these tell what makes executions go wrong.
+    calibration : CalibrationCurve
+        How often transitions of a predicted probability are Reliable.
+    feature_ranges : ndarray of shape (n_features, 2)
+        Least and greatest value of each feature.
+    constant_features : tuple of int
+        Columns that have one value only. Bytes of voxel grids (uint8), of which many are always
+        empty, count neither here nor as duplicates.
+    duplicate_features : tuple of pairs of int
+        Columns that are equal: the first of them, and a later one.
+    unscaled_features : tuple of int
+        Columns of a size that a network learns badly from; none for other estimators.
+    """
+
+    labels: Summary
+    n_folds: int | None
+    accuracy: float
+    beats_base_rate: bool
+    balanced_accuracy: float
+    reliable_recall: float
+    unreliable_recall: float
+    onset_recall: float
+    calibration: CalibrationCurve
+    feature_ranges: NDArray[np.float64]
+    constant_features: tuple[int, ...]
+    duplicate_features: tuple[tuple[int, int], ...]
+    unscaled_features: tuple[int, ...]
+
+    @property
+    def base_rate(self) -> float:
+        """Accuracy of predicting the more frequent label for every transition."""
+        return self.labels.base_rate
+
+    @property
+    def already_diverged_share(self) -> float:
+        """Share of the Unreliable labels that only say that the execution had diverged before."""
+        return self.labels.already_diverged_share
+
+    @property
+    def expected_calibration_error(self) -> float:
+        """How far predicted probabilities are from the shares observed, in the mean."""
+        return self.calibration.expected_error
+
+    @property
+    def warnings(self) -> list[str]:
+        """Sentences that say what is wrong and what to do, most important first."""
+        return diagnosis_warnings(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all numbers and warnings as JSON can hold them; None stands for NaN."""
+        labels = {
+            name: getattr(self.labels, name)
+            for name in (
+                "n_transitions",
+                "n_plans",
+                "n_plans_of_rarer_label",
+                "unreliable_share",
+                "executed_share",
+            )
+        }
+        own = {field.name: getattr(self, field.name) for field in fields(self)} | labels
+        del own["labels"]
+        own["feature_ranges"] = self.feature_ranges.tolist()
+        own["calibration"] = {k: v.tolist() for k, v in self.calibration._asdict().items()}
+        for name in (
+            "base_rate",
+            "already_diverged_share",
+            "expected_calibration_error",
+            "warnings",
+        ):
+            own[name] = getattr(self, name)
+        own["duplicate_features"] = [list(pair) for pair in self.duplicate_features]
+        for name in ("constant_features", "unscaled_features"):
+            own[name] = list(own[name])
+        return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in own.items()}
+
+    def __str__(self) -> str:
+        """Return a table of the numbers, and the warnings below."""
+        labels = self.labels
+        rows = {
+            "base rate (one label for every transition)": _share(self.base_rate),
+            "accuracy": _share(self.accuracy),
+            "balanced accuracy (chance is 0.5)": _share(self.balanced_accuracy),
+            "recall of Reliable": _share(self.reliable_recall),
+            "recall of Unreliable": _share(self.unreliable_recall),
+            "recall of divergence onsets": _share(self.onset_recall),
+            "expected calibration error": _share(self.expected_calibration_error),
+            "Unreliable among the labels": _share(labels.unreliable_share),
+            "  of these, only say: already diverged": _share(self.already_diverged_share),
+            "labels from executed states": _share(labels.executed_share),
+            "features": str(len(self.feature_ranges)),
+            "  constant": str(len(self.constant_features)),
+            "  equal to another": str(len(self.duplicate_features)),
+        }
+        table = "\n".join(f"{name:<44}{value:>8}" for name, value in rows.items())
+        warnings = [f"{i}. {sentence}" for i, sentence in enumerate(self.warnings, 1)]
+        return "\n".join(
+            [
+                f"{labels.n_transitions:,} transitions of {labels.n_plans:,} plans, {self._how()}",
+                table,
+                "Warnings, most important first:" if warnings else "No warnings.",
+                *warnings,
+            ]
+        )
+
+    __repr__ = __str__
+
+    def _how(self) -> str:
+        if self.n_folds is None:
+            return "too few or too much alike to judge predictions"
+        if self.n_folds == 0:
+            return "judged by the estimator as it is"
+        return f"each judged by a clone that has not seen its plan ({self.n_folds} folds)"
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw calibration, recalls beside the base rate, and ranges of features.
+
+        Parameters
+        ----------
+        axes : sequence of three matplotlib Axes, default=None
+            None makes a figure.
+
+        Returns
+        -------
+        axes : sequence of three matplotlib Axes
+        """
+        return draw_diagnosis(self, axes)
+
+
+def diagnose(
+    estimator: Any,
+    transitions: Transitions,
+    system: SceneArgument,
+    *,
+    cv: int = 5,
+    n_jobs: int | None = None,
+) -> Diagnosis:
+    """Tell what labels, features and an estimator are worth, before planning with it.
+
+    The plans are split into ``cv`` parts, and a clone of the estimator is trained anew without each
+    part and judged on it: training transitions would flatter an estimator, and so would
+    other transitions of plans that it was trained on. Give the transitions that you train on; the
+    estimator may be fitted or not, and is left as it is. To judge a fitted one as it is, on
+    transitions of plans that it has not seen, give ``sklearn.frozen.FrozenEstimator(estimator)``.
+
+    To compare sets of features, call it with systems that differ in ``features``.
+
+    Parameters
+    ----------
+    estimator : classifier
+        Any of scikit-learn, a Pipeline, a search or a
+        :class:`TransitionReliabilityClassifier`. If its ``fit`` takes groups, it gets plan ids.
+    transitions : Transitions
+        At least one.
+    system : System, sequence of Systems, or callable ``random_state -> System``
+        As for :meth:`Transitions.features`.
+    cv : int, default=5
+        Parts, at least 2, and so many trainings; fewer if there are fewer plans.
+    n_jobs : int, default=None
+        Processes that train at the same time.
+
+    Returns
+    -------
+    diagnosis : Diagnosis
+        To be printed and plotted; ``diagnosis.warnings`` says what to do.
+
+    Raises
+    ------
+    ValueError
+        If an argument is unfit.
+
+    Examples
+    --------
+    >>> from sklearn.linear_model import LogisticRegression
+    >>> from planners import BiasedRRTConnect
+    >>> from reliability import collect_transitions, diagnose
+    >>> from systems import PlanarArm
+    >>> arm = PlanarArm()
+    >>> data = collect_transitions(arm, BiasedRRTConnect(arm), 20, random_state=0)
+    >>> diagnosis = diagnose(LogisticRegression(max_iter=1000), data, arm)
+    >>> diagnosis.n_folds
+    5
+    """
+    _check_arguments(estimator, transitions, cv)
+    labels = Summary.of(transitions)
+    X = transitions.features(system).reshape(len(transitions), -1)
+    n_folds = None
+    predictions = None
+    if labels.base_rate < 1 and (labels.n_plans > 1 or isinstance(estimator, FrozenEstimator)):
+        n_folds = 0 if isinstance(estimator, FrozenEstimator) else min(int(cv), labels.n_plans)
+        y, plan = transitions.y, transitions.plan
+        predictions = predict_unseen(estimator, X, y, plan, n_folds, n_jobs)
+    is_network = isinstance(estimator, TransitionReliabilityClassifier)
+    ranges = np.column_stack([X.min(axis=0), X.max(axis=0)]).astype(float)
+    constant = constant_columns(X, ranges)
+    return Diagnosis(
+        labels=labels,
+        n_folds=n_folds,
+        **_scores(transitions, predictions),
+        feature_ranges=ranges,
+        constant_features=constant,
+        duplicate_features=duplicate_columns(X, constant),
+        unscaled_features=unscaled_columns(X, ranges) if is_network else (),
+    )
+
+
+def _check_arguments(estimator: Any, transitions: Any, cv: Any) -> None:
+    if not isinstance(transitions, Transitions) or not len(transitions):
+        raise ValueError(
+            "transitions must be Transitions, at least one, as collect_transitions returns them; "
+            f"got {transitions!r}."
+        )
+    if isinstance(estimator, type) or not all(
+        hasattr(estimator, name) for name in ("fit", "predict", "get_params")
+    ):
+        raise ValueError(
+            "estimator must be a classifier with the methods of scikit-learn's (fit, predict and "
+            f"get_params), got {estimator!r}."
+        )
+    check_count(cv, "cv")
+    if cv < 2:
+        raise ValueError(f"cv must be at least 2, got {cv}.")
+
+
+def _scores(transitions: Transitions, predictions: UnseenPredictions | None) -> dict[str, Any]:
+    if predictions is None:
+        names = ("accuracy", "balanced_accuracy", "reliable_recall", "unreliable_recall")
+        unknown = dict.fromkeys((*names, "onset_recall"), math.nan)
+        nothing = CalibrationCurve.of(np.zeros(0, dtype=np.bool_), np.zeros(0))
+        return {**unknown, "beats_base_rate": False, "calibration": nothing}
+    reliable = transitions.y == RELIABLE
+    right = predictions.reliable == reliable
+    of_reliable, of_unreliable = right[reliable].mean(), right[~reliable].mean()
+    told = np.isfinite(predictions.probability)
+    return {
+        "accuracy": float(right.mean()),
+        "beats_base_rate": beats_base_rate(transitions.y, right, transitions.plan),
+        "balanced_accuracy": float(of_reliable + of_unreliable) / 2,
+        "reliable_recall": float(of_reliable),
+        "unreliable_recall": float(of_unreliable),
+        "onset_recall": float(right[transitions.divergence_onsets()].mean()),
+        "calibration": CalibrationCurve.of(reliable[told], predictions.probability[told]),
+    }
+
+
+def _share(value: float) -> str:
+    return "unknown" if math.isnan(value) else f"{value:.3f}"
