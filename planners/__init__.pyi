@@ -13,3 +13,4 @@ from .result import PlanStatus as PlanStatus
 from .rrt import BiasedRRT as BiasedRRT
 from .rrt_connect import BiasedRRTConnect as BiasedRRTConnect
 from .share import Share as Share
+from .success_calibration import SuccessCalibration as SuccessCalibration

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import time
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
+from sklearn.utils.validation import check_is_fitted
 from threadpoolctl import threadpool_limits
 
 from planners.budget import Budget, never
@@ -19,11 +20,13 @@ from planners.check_transition import CheckTransition
 from planners.edge_checker import EdgeChecker
 from planners.path import Path
 from planners.planning_problem import PlanningProblem
+from planners.restarts import best_until_enough
 from planners.result import PlanResult, PlanStatus
 from planners.shortcutting import shorten
 from planners.shortcutting_repropagated import RepropagatedShortcuts
+from planners.success_calibration import SuccessCalibration
 from systems.system import Array, System
-from systems.validation import RandomState, as_seed, check_count
+from systems.validation import RandomState, as_seed, check_count, check_number, is_integer
 
 
 class Search(NamedTuple):
@@ -76,6 +79,9 @@ class BiasedPlanner(BaseEstimator):
     simplify: bool = True
     max_iterations: int = 20_000
     time_limit: float | None = None
+    calibration: SuccessCalibration | None = None
+    min_success: float = 0.0
+    restarts: int = 0
     random_state: RandomState = None
 
     @abstractmethod
@@ -102,7 +108,7 @@ class BiasedPlanner(BaseEstimator):
         ValueError
             If a parameter, the start, the goal or the estimator is unfit.
         sklearn.exceptions.NotFittedError
-            If the estimator is not fitted.
+            If the estimator or the calibration is not fitted.
         """
         return self.plan_from_any([start_reduced], goal)
 
@@ -126,16 +132,51 @@ class BiasedPlanner(BaseEstimator):
         -------
         PlanResult
         """
-        began = time.perf_counter()
         self._check_parameters()
-        seed = as_seed(self.random_state)
-        search = self._build(seed, starts_reduced, goal, terminated)
+        attempts = self._attempts(starts_reduced, goal, terminated)
+        best = best_until_enough(attempts, self.min_success, lambda plan: plan.success_probability)
+        return self._judged(best)
+
+    def _attempts(
+        self, starts: Sequence[ArrayLike], goal: ArrayLike, terminated: Callable[[], bool]
+    ) -> Iterator[PlanResult]:
+        """Plan with one seed after another, until nothing is left of the time."""
+        seed, limit = as_seed(self.random_state), self.time_limit
+        for number in range(1 + int(self.restarts)):
+            plan = self._plan_once(_restart_seed(seed, number), limit, starts, goal, terminated)
+            yield replace(plan, random_state=seed)
+            if plan.status in (PlanStatus.TIME_LIMIT, PlanStatus.TERMINATED):
+                return
+            limit = None if limit is None else max(0.0, limit - plan.planning_time)
+
+    def _plan_once(
+        self,
+        seed: int,
+        time_limit: float | None,
+        starts: Sequence[ArrayLike],
+        goal: ArrayLike,
+        terminated: Callable[[], bool],
+    ) -> PlanResult:
+        began = time.perf_counter()
+        budget = Budget(int(self.max_iterations), time_limit, terminated)
+        search = self._build(seed, starts, goal, budget)
         with _one_thread(search.check):
             found = self._search(search)
             searched = time.perf_counter()
             path = self._shortened(found, search)
         times = searched - began, time.perf_counter() - searched
-        return self._report(search, found, path, times, seed)
+        return self._calibrated(self._report(search, found, path, times, seed))
+
+    def _calibrated(self, plan: PlanResult) -> PlanResult:
+        if self.calibration is None or not plan.solved:
+            return plan
+        probability = float(self.calibration.predict_proba([plan])[0, 1])
+        return replace(plan, calibrated_probability=probability)
+
+    def _judged(self, plan: PlanResult) -> PlanResult:
+        if plan.solved and plan.success_probability < self.min_success:
+            return replace(plan, status=PlanStatus.DISTRUSTED)
+        return plan
 
     def ompl_planner(self, space_information: Any, start_reduced: ArrayLike | None = None) -> Any:
         """Make an OMPL planner of this one, for a problem that is set up in OMPL.
@@ -174,13 +215,31 @@ class BiasedPlanner(BaseEstimator):
         is_number = isinstance(limit, int | float | np.number) and not isinstance(limit, bool)
         if limit is not None and not (is_number and limit > 0):
             raise ValueError(f"time_limit must be None or positive seconds, got {limit!r}.")
+        if not is_integer(self.restarts) or self.restarts < 0:
+            raise ValueError(f"restarts must be 0 or a positive integer, got {self.restarts!r}.")
+        self._check_trust()
+
+    def _check_trust(self) -> None:
+        check_number(self.min_success, "min_success", 0, 1)
+        calibration = self.calibration
+        if calibration is not None and not isinstance(calibration, SuccessCalibration):
+            raise ValueError(
+                f"calibration must be None or a SuccessCalibration, got {calibration!r}."
+            )
+        if self.estimator is None and (calibration is not None or self.min_success > 0):
+            raise ValueError(
+                "calibration and min_success need an estimator: without one nothing is known of "
+                "how likely a plan is to go well. Pass estimator, or leave both out."
+            )
+        if calibration is not None:
+            check_is_fitted(calibration)
 
     def _build(
         self,
         seed: int,
         starts: Sequence[ArrayLike],
         goal: ArrayLike,
-        terminated: Callable[[], bool],
+        budget: Budget,
     ) -> Search:
         for_search, for_ompl = np.random.SeedSequence(seed).spawn(2)
         rng = np.random.default_rng(for_search)
@@ -188,7 +247,6 @@ class BiasedPlanner(BaseEstimator):
             self.system, self.estimator, k=self.k, accuracy=self.accuracy, rng=rng
         )
         problem = PlanningProblem.checked(self.system, starts, goal).with_trusted_goals(check)
-        budget = Budget(int(self.max_iterations), self.time_limit, terminated)
         # OMPL ignores a seed of zero.
         return Search(problem, check, budget, rng, 1 + int(for_ompl.generate_state(1)[0]))
 
@@ -227,6 +285,15 @@ class BiasedPlanner(BaseEstimator):
             tree=found.tree,
             random_state=seed,
         )
+
+
+def _restart_seed(seed: int, number: int) -> int:
+    """Return the seed of a restart; the first attempt, number 0, has the planner's own."""
+    if number == 0:
+        return seed
+    # The first two children of the seed's sequence are those of the search.
+    sequence = np.random.SeedSequence(seed, spawn_key=(1 + number,))
+    return int(sequence.generate_state(1, np.uint64)[0])
 
 
 def _standing(problem: PlanningProblem) -> Path:

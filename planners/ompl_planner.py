@@ -82,7 +82,8 @@ class OmplPlanner(ob.Planner):
         -------
         ompl.base.PlannerStatus
             ``EXACT_SOLUTION``, ``TIMEOUT``, ``INVALID_START``, ``INVALID_GOAL`` or, for a goal
-            that can't be sampled, ``UNRECOGNIZED_GOAL_TYPE``.
+            that can't be sampled, ``UNRECOGNIZED_GOAL_TYPE``. ``ABORT`` for a plan less likely to
+            go well than ``min_success``, which is in ``result`` alone.
 
         Raises
         ------
@@ -100,8 +101,10 @@ class OmplPlanner(ob.Planner):
             return ob.PlannerStatus(ob.PlannerStatus.INVALID_GOAL)
         self.result = self._planner.plan_from_any(starts, goals, termination)
         self._graph = _graph(self.result, starts, goals)
-        if not self.result.success:
+        if not self.result.solved:
             return ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)
+        if not self.result.success:
+            return ob.PlannerStatus(ob.PlannerStatus.ABORT)
         self._add_solution(self.result)
         return ob.PlannerStatus(ob.PlannerStatus.EXACT_SOLUTION)
 
@@ -199,7 +202,7 @@ class _Graph(NamedTuple):
 def _graph(result: PlanResult, starts: Array, goals: Array) -> _Graph:
     dim = goals.shape[1]
     starts = starts[:, :dim]
-    if result.success:
+    if result.solved:
         goals = np.concatenate([goals, result.reduced[-1:, :dim]])
     rows = np.concatenate([starts, result.tree.reshape(-1, dim)])
     vertices, vertex_of = np.unique(rows, axis=0, return_inverse=True)

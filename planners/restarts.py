@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +28,9 @@ def best_of_restarts(
 ) -> PlanResult:
     """Plan again until a plan's score is high enough, and keep the plan of the highest score.
 
+    For scores and ways of planning of one's own. To plan again until a planner's plan is at least
+    as likely to go well as ``min_success``, give the planner ``restarts``.
+
     Parameters
     ----------
     attempt : callable
@@ -52,12 +55,20 @@ def best_of_restarts(
     """
     check_count(n_plans, "n_plans")
     check_number(enough, "enough", -np.inf, np.inf)
-    plans: list[PlanResult] = []
+    return best_until_enough((attempt(number) for number in range(n_plans)), enough, score)
+
+
+def best_until_enough(
+    plans: Iterable[PlanResult], enough: float, score: Callable[[PlanResult], float]
+) -> PlanResult:
+    """Take plans until one of them scores enough, and return the best with the costs of all."""
+    made: list[PlanResult] = []
     scores: list[float] = []
-    while not plans or (len(plans) < n_plans and max(scores) < enough):
-        plan = attempt(len(plans))
-        plans.append(plan)
-        scored = score(plan) if plan.success else np.nan
+    for plan in plans:
+        made.append(plan)
+        scored = score(plan) if plan.solved else np.nan
         scores.append(-np.inf if np.isnan(scored) else scored)
-    costs = {name: sum(getattr(plan, name) for plan in plans) for name in _COSTS}
-    return replace(plans[int(np.argmax(scores))], **costs)
+        if scores[-1] >= enough:
+            break
+    costs = {name: sum(getattr(plan, name) for plan in made) for name in _COSTS}
+    return replace(made[int(np.argmax(scores))], **costs)

@@ -14,6 +14,8 @@ from reliability.archive import read_arrays, write_arrays
 
 FORMAT_VERSION = 2
 Array = NDArray[np.float64]
+# Left out of a file where they are None.
+_MAY_BE_NONE = frozenset({"reliability", "calibrated_probability"})
 
 
 class PlanStatus(Enum):
@@ -32,6 +34,11 @@ class PlanStatus(Enum):
         "No plan was found before OMPL's termination condition became true. Allow the planner "
         "more time, or lower k so that more Unreliable transitions are accepted."
     )
+    DISTRUSTED = (
+        "The plan reaches the goal, but it is less likely to go well than min_success. Raise "
+        "restarts to plan again with other seeds, train the estimator on more executed plans like "
+        "this one, or lower min_success."
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +48,15 @@ class PlanResult:
     Attributes
     ----------
     reduced : ndarray of shape (T + 1, reduced_dim)
-        Reduced states, the start first; the start alone without a plan.
+        Reduced states, the start first; the start alone without a plan. A distrusted plan is
+        here too.
     commands : ndarray of shape (T, command_dim)
     status : PlanStatus
     reliability : ndarray of shape (T,) or None
         Probability that each transition is Reliable; 1 or 0 from an estimator that only
         predicts, None without an estimator.
     planning_time, simplification_time : float
-        Seconds.
+        Seconds; with restarts, of all searches together, as are the counts.
     n_checked : int
         Transitions that the estimator was asked about, in the search and in simplification.
     n_rejected : int
@@ -59,6 +67,9 @@ class PlanResult:
         Configurations of accepted edges, in the direction of execution.
     random_state : int
         Seed that gives this result again.
+    calibrated_probability : float or None, default=None
+        Probability that the plan goes well, from the planner's ``calibration``; None where the
+        planner has none or there is no plan.
     """
 
     reduced: Array
@@ -72,19 +83,35 @@ class PlanResult:
     n_accepted_unreliable: int
     tree: Array
     random_state: int
+    calibrated_probability: float | None = None
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is a plan that reaches the goal, trusted or not."""
+        return self.status in (PlanStatus.SOLVED, PlanStatus.DISTRUSTED)
 
     @property
     def success(self) -> bool:
-        """Whether the plan reaches the goal; False for anything short of it."""
+        """Whether there is a plan that reaches the goal and is to be trusted."""
         return self.status is PlanStatus.SOLVED
 
     @property
     def success_probability(self) -> float:
+        """Probability that the plan goes well.
+
+        It is ``calibrated_probability`` if the planner has a calibration, else
+        ``reliability_product``, which orders plans well and is no frequency of success.
+        """
+        calibrated = self.calibrated_probability
+        return self.reliability_product if calibrated is None else calibrated
+
+    @property
+    def reliability_product(self) -> float:
         """Probability that all transitions are Reliable, if they don't depend on one another.
 
         1 without an estimator, and 0 without a plan.
         """
-        if not self.success:
+        if not self.solved:
             return 0.0
         return 1.0 if self.reliability is None else float(self.reliability.prod())
 
@@ -94,8 +121,9 @@ class PlanResult:
         values["status"] = self.status.name
         # As text, since a seed may be larger than any of numpy's integers.
         values["random_state"] = str(self.random_state)
-        if self.reliability is None:
-            del values["reliability"]
+        for name in _MAY_BE_NONE:
+            if values[name] is None:
+                del values[name]
         write_arrays(path, values, format_version=FORMAT_VERSION)
 
     @classmethod
@@ -107,11 +135,11 @@ class PlanResult:
         ValueError
             If the file is no such file, is truncated, or has another format version.
         """
-        names = {field.name for field in fields(cls)} - {"reliability"}
+        names = {field.name for field in fields(cls)} - _MAY_BE_NONE
         arrays = read_arrays(path, names, format_version=FORMAT_VERSION, kind="a plan")
         _check_arrays(path, arrays)
-        values: dict[str, Any] = {"reliability": None} | arrays
-        for name in names - {"reduced", "commands", "tree"}:
+        values: dict[str, Any] = dict.fromkeys(_MAY_BE_NONE) | arrays
+        for name in arrays.keys() - {"reduced", "commands", "tree", "reliability"}:
             values[name] = arrays[name].item()
         values["status"] = PlanStatus[values["status"]]
         values["random_state"] = int(values["random_state"])

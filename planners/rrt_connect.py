@@ -41,9 +41,18 @@ class BiasedRRTConnect(BiasedPlanner):
     simplify : bool, default=True
         Take shortcuts of which every transition is classified Reliable.
     max_iterations : int, default=20000
-        Samples to draw before giving up.
+        Samples to draw before giving up; each restart begins anew.
     time_limit : float, default=None
-        Seconds to search before giving up. Only without it are results the same on every machine.
+        Seconds to search before giving up, all restarts together. Only without it are results the
+        same on every machine.
+    calibration : SuccessCalibration, default=None
+        Fitted on executed plans; gives each plan its ``success_probability``. None takes the
+        product of the transitions' reliabilities, which is seldom a frequency of success.
+    min_success : float, default=0.0
+        A plan whose ``success_probability`` is less gets the status ``DISTRUSTED``.
+    restarts : int, default=0
+        How often to plan again, with seeds that follow from ``random_state``, while there is no
+        plan or only a distrusted one. The likeliest plan is returned; times and counts add up.
     random_state : int, Generator, RandomState, SeedSequence or None, default=None
 
     References

@@ -233,6 +233,43 @@ def test_its_own_limits_hold_too(planner):
     assert (status, stopped.result.status) == (TIMEOUT, PlanStatus.ITERATION_LIMIT)
 
 
+class Hesitant(HalfPlane):
+    """Calls every transition Reliable, with the probability 0.7."""
+
+    def predict(self, X):
+        return np.ones(len(X), dtype=int)
+
+    def predict_proba(self, X):
+        return np.tile([0.3, 0.7], (len(X), 1))
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_a_distrusted_plan_is_no_solution_and_is_attached(planner):
+    careful = planner(Disc(), Hesitant(), min_success=0.9, restarts=2, random_state=0)
+    direct = careful.plan(START, GOAL)
+    assert direct.status is PlanStatus.DISTRUSTED
+    setup = setup_of(Disc(), START, GOAL)
+    status, distrusting = solve(setup, careful)
+    assert status == ob.PlannerStatus.ABORT
+    assert not setup.haveSolutionPath()
+    assert_same_plan(distrusting.result, direct)
+    once = planner(Disc(), Hesitant(), random_state=0).plan(START, GOAL)
+    assert direct.n_checked > 2 * once.n_checked
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_ompls_termination_condition_ends_restarts(planner):
+    setup = setup_of(Disc(), START, GOAL)
+    termination, asked = stop_after(5)
+    hopeless = planner(
+        Disc(), Nowhere(), k=np.inf, max_iterations=10**9, restarts=10**9, random_state=0
+    )
+    status, stopped = solve(setup, hopeless, termination=termination)
+    assert status == TIMEOUT
+    assert stopped.result.status is PlanStatus.TERMINATED
+    assert len(asked) < 10
+
+
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_it_solves_again_with_and_without_clearing(planner):
     setup = setup_of(Disc(), START, GOAL)

@@ -49,6 +49,12 @@ def test_any_plan_is_better_than_none_and_no_plan_is_a_result():
     assert failed.planning_time == 3.0
 
 
+def test_a_distrusted_plan_is_better_than_none():
+    plans = [PLANS[0], plan_of(0.3, status=PlanStatus.DISTRUSTED, seed=1), plan_of(0.2, seed=2)]
+    kept = best_of_restarts(plans.__getitem__, 3)
+    assert (kept.random_state, kept.status) == (1, PlanStatus.DISTRUSTED)
+
+
 def test_a_plan_without_a_score_is_not_kept():
     plans = [plan_of(0.9, np.nan, seed=0), plan_of(0.1, seed=1), plan_of(np.nan, seed=2)]
     assert best_of_restarts(plans.__getitem__, 3).random_state == 1
