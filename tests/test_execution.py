@@ -133,6 +133,7 @@ def test_stopped_at_a_constraint_and_without_a_new_plan_nothing_more_is_done():
     execution = cross(StickyPeg(), Straight(), max_replans=2)
     assert execution.status is ExecutionStatus.NO_PLAN
     assert execution.stop_reason is StopReason.CONSTRAINT
+    assert len(execution.commands) == len(cross(StickyPeg(), Straight()).commands)
     assert len(execution.commands) < len(execution.plans[0].commands)
 
 
