@@ -21,7 +21,7 @@ from systems.system import System
 from systems.validation import RandomState, as_seed, check_count, check_number
 
 _KIND = "a planner's executions of unseen problems, one problem in each file"
-# No collection has so many plans, so that none has these seeds.
+# No collection has a plan of this number, so that none has these seeds.
 _PURPOSE = (2**32 - 1,)
 
 
@@ -40,10 +40,11 @@ def evaluate(
     """Plan and execute on unseen problems, and count what goes well.
 
     Problems, scenes that a callable makes, and the planner's seeds follow from ``random_state``
-    and the problem's number alone. They are others than those of
-    :func:`reliability.collect_transitions` with the same ``random_state``, whose seeds are
-    spawned from it with other keys. All planners get the same problems: evaluate each with the
-    same ``random_state``, and see :meth:`Evaluation.compare`.
+    and the problem's number alone: from ``SeedSequence(random_state, spawn_key=(2**32 - 1,
+    number))``. :func:`reliability.collect_transitions` spawns with ``(number,)``, so that an
+    evaluation has other problems than a collection with the same ``random_state``. All planners
+    get the same problems: evaluate each with the same ``random_state``, and see
+    :meth:`Evaluation.compare`.
 
     Parameters
     ----------

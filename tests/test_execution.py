@@ -11,7 +11,7 @@ from toy_systems import Disc, Odometer, Turntable
 
 from planners import BiasedRRT, BiasedRRTConnect, ExecutionStatus, execute
 from planners.distrust import DistrustedTransitions
-from systems import Car, Problem, StopReason
+from systems import Problem, StopReason
 
 ACROSS = Problem(np.array([-0.55, 0.0]), np.array([[0.55, 0.0]]))
 
@@ -133,6 +133,7 @@ def test_stopped_at_a_constraint_and_without_a_new_plan_nothing_more_is_done():
     execution = cross(StickyPeg(), Straight(), max_replans=2)
     assert execution.status is ExecutionStatus.NO_PLAN
     assert execution.stop_reason is StopReason.CONSTRAINT
+    assert len(execution.commands) == len(cross(StickyPeg(), Straight()).commands)
     assert len(execution.commands) < len(execution.plans[0].commands)
 
 
@@ -284,8 +285,32 @@ def test_distrust_knows_that_angles_wrap():
     assert not distrusted.includes(forwards[0], 2 * forwards[0] - 3.2).any()
 
 
+@pytest.mark.parametrize("allowed", [True, False])
+def test_what_g_predicts_from_the_executed_state_is_distrusted(allowed, monkeypatch):
+    """Or what was planned, where g predicts nothing from there."""
+
+    class Drifts(Point):
+        close_distance = 0.05
+
+        def move(self, state, command):
+            return state + command + [0.0, 0.03], True
+
+        def propagate(self, reduced, command):
+            following, _ = super().propagate(reduced, command)
+            return following, (np.abs(reduced[:, 1]) < 0.02) | allowed
+
+    found = []
+    monkeypatch.setattr(DistrustedTransitions, "add", lambda _, *ends: found.append(ends))
+    execution = cross(Drifts(), max_replans=1)
+    assert len(found) == 1
+    states, planned = execution.states, execution.plans[0].reduced
+    expected = (states[1], states[1] + execution.commands[1]) if allowed else planned[1:3]
+    np.testing.assert_allclose(found[0], expected)
+
+
 def test_standing_still_stays_trusted():
     distrusted = DistrustedTransitions(Point())
     distrusted.add(np.zeros(2), np.zeros(2))
     assert len(distrusted) == 0
-    assert distrusted.left_out_of(Car) is Car, "nothing to leave out"
+    system = Point()
+    assert distrusted.left_out_of(system) is system, "nothing to leave out"
