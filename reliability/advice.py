@@ -63,10 +63,7 @@ def _about_predictions(diagnosis: Diagnosis) -> Iterable[str]:
             "where the estimator has it), or collect more plans."
         )
     elif weak:
-        yield (
-            f"The balanced accuracy is {diagnosis.balanced_accuracy:.2f}, and 0.5 is chance: "
-            f"{_better_features()}."
-        )
+        yield _weak(diagnosis)
     if diagnosis.expected_calibration_error > POOR_CALIBRATION:
         yield (
             f"Probabilities are off by {diagnosis.expected_calibration_error:.2f} on average, so "
@@ -146,6 +143,16 @@ def _at_base_rate(diagnosis: Diagnosis) -> str:
         f"Accuracy {diagnosis.accuracy:.3f} is no better than the base rate "
         f"{labels.base_rate:.3f}, which one label for every transition reaches; {cause}."
     )
+
+
+def _weak(diagnosis: Diagnosis) -> str:
+    told = f"The balanced accuracy is {diagnosis.balanced_accuracy:.2f}, and 0.5 is chance"
+    # Where onsets are recognized better than what follows them, that looks Reliable: its labels
+    # don't tell what it is like.
+    labels_mislead = diagnosis.unreliable_recall < diagnosis.onset_recall
+    if labels_mislead and diagnosis.labels.already_diverged_share >= 0.5:
+        return f"{told}; {_already_diverged(diagnosis.labels)}."
+    return f"{told}: {_better_features()}."
 
 
 def _onsets_missed(diagnosis: Diagnosis) -> str:

@@ -287,6 +287,25 @@ def test_knowing_only_what_follows_a_divergence_is_noticed(rng):
     assert well.warnings == [], "labels of Eq. 3 that are understood are no fault"
 
 
+@pytest.mark.parametrize("after_is_known", [False, True])
+def test_labels_are_blamed_where_what_follows_a_divergence_looks_reliable(after_is_known):
+    plans = [[RELIABLE] * 6 + [UNRELIABLE] * 6] * 60
+    labels, step = np.concatenate(plans), np.tile(np.arange(12), 60)
+    answers = (step != 6).astype(int)
+    if after_is_known:
+        of_onsets = np.repeat(np.arange(60) % 2, 12)
+        answers = np.select([step < 4, step == 6, step > 9], [1, of_onsets, 1], 0)
+    shares = [labels[answers == one].mean() for one in (0, 1)]
+    data = table(np.column_stack([answers, np.take(shares, answers)]), plans)
+    diagnosis = diagnose(scripted(), data, Table())
+    assert diagnosis.balanced_accuracy < 0.7
+    assert diagnosis.onset_recall >= 0.5
+    (warning,) = diagnosis.warnings
+    assert warning.startswith("The balanced accuracy is 0.")
+    assert ("collect with labels='executed'" in warning) == (not after_is_known)
+    assert ("let system.features" in warning) == after_is_known
+
+
 def answers_with_recalls(rng, of_unreliable, of_reliable, unreliable_share=0.5, n_plans=400):
     """Make executed transitions, and answers that are right for such shares of each label."""
     labels = (np.linspace(0, 1, 5 * n_plans) >= unreliable_share).astype(int)
