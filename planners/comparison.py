@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from planners.share import draw_share
-
-if TYPE_CHECKING:
-    from planners.evaluation import Evaluation
 
 
 class Comparison:
@@ -24,7 +21,7 @@ class Comparison:
     evaluations : dict of str to Evaluation
     """
 
-    def __init__(self, evaluations: dict[str, Evaluation]) -> None:
+    def __init__(self, evaluations: dict[str, Any]) -> None:
         if not evaluations:
             raise ValueError("evaluations must hold at least one Evaluation, got none.")
         self.evaluations = evaluations
@@ -115,7 +112,7 @@ class Comparison:
         return axis
 
 
-def _same_problems(one: Evaluation, other: Evaluation) -> bool:
+def _same_problems(one: Any, other: Any) -> bool:
     return (
         one.random_state == other.random_state
         and one.tolerance == other.tolerance

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import Any
 
 from reliability.base_rate import WEAK_BALANCED_ACCURACY
-
-if TYPE_CHECKING:
-    from reliability.diagnosis import Diagnosis
-    from reliability.summary import Summary
 
 # Figures of so few plans change with every plan.
 FEW_PLANS = 20
@@ -20,7 +16,7 @@ _MOSTLY_DIVERGED = 2 / 3
 _MOST_LISTED = 8
 
 
-def label_warnings(labels: Summary) -> list[str]:
+def label_warnings(labels: Any) -> list[str]:
     """Say what the labels alone show to be wrong, most important first."""
     if labels.base_rate == 1:
         return [_one_label(labels)]
@@ -32,7 +28,7 @@ def label_warnings(labels: Summary) -> list[str]:
     return warnings
 
 
-def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
+def diagnosis_warnings(diagnosis: Any) -> list[str]:
     """Say what is wrong, most important first: labels, then predictions, then features."""
     labels = diagnosis.labels
     warnings = []
@@ -50,7 +46,7 @@ def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
     return [*warnings, *_about_features(diagnosis)]
 
 
-def _about_predictions(diagnosis: Diagnosis) -> Iterable[str]:
+def _about_predictions(diagnosis: Any) -> Iterable[str]:
     weak = diagnosis.balanced_accuracy < WEAK_BALANCED_ACCURACY
     if weak and not diagnosis.beats_base_rate:
         yield _at_base_rate(diagnosis)
@@ -72,7 +68,7 @@ def _about_predictions(diagnosis: Diagnosis) -> Iterable[str]:
         )
 
 
-def _about_features(diagnosis: Diagnosis) -> Iterable[str]:
+def _about_features(diagnosis: Any) -> Iterable[str]:
     constant = diagnosis.constant_features
     if 0 < len(constant) < len(diagnosis.feature_ranges):
         yield (
@@ -93,7 +89,7 @@ def _about_features(diagnosis: Diagnosis) -> Iterable[str]:
         )
 
 
-def _one_label(labels: Summary) -> str:
+def _one_label(labels: Any) -> str:
     if labels.unreliable_share == 0:
         return (
             f"All {labels.n_transitions:,} labels are Reliable, so that there is nothing to learn: "
@@ -109,7 +105,7 @@ def _one_label(labels: Summary) -> str:
     )
 
 
-def _few_plans(labels: Summary) -> str:
+def _few_plans(labels: Any) -> str:
     rarer = "Unreliable" if labels.unreliable_share <= 0.5 else "Reliable"
     n = labels.n_plans_of_rarer_label
     return (
@@ -119,7 +115,7 @@ def _few_plans(labels: Summary) -> str:
     )
 
 
-def _already_diverged(labels: Summary) -> str:
+def _already_diverged(labels: Any) -> str:
     """Return a clause about labels of Eq. 3 that say nothing of their own transition."""
     remedy = (
         "keep transitions[transitions.executed]"
@@ -132,7 +128,7 @@ def _already_diverged(labels: Summary) -> str:
     )
 
 
-def _at_base_rate(diagnosis: Diagnosis) -> str:
+def _at_base_rate(diagnosis: Any) -> str:
     labels = diagnosis.labels
     cause = (
         _already_diverged(labels)
@@ -145,7 +141,7 @@ def _at_base_rate(diagnosis: Diagnosis) -> str:
     )
 
 
-def _weak(diagnosis: Diagnosis) -> str:
+def _weak(diagnosis: Any) -> str:
     told = f"The balanced accuracy is {diagnosis.balanced_accuracy:.2f}, and 0.5 is chance"
     # Where onsets are recognized better than what follows them, that looks Reliable: its labels
     # don't tell what it is like.
@@ -155,7 +151,7 @@ def _weak(diagnosis: Diagnosis) -> str:
     return f"{told}: {_better_features()}."
 
 
-def _onsets_missed(diagnosis: Diagnosis) -> str:
+def _onsets_missed(diagnosis: Any) -> str:
     recall = f"Only {diagnosis.onset_recall:.0%} of the transitions at which executions diverge"
     if diagnosis.labels.already_diverged_share >= 0.5:
         return f"{recall} are recognized; {_already_diverged(diagnosis.labels)}."

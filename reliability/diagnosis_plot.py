@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from reliability.calibration_curve import N_BINS
 
-if TYPE_CHECKING:
-    from reliability.diagnosis import Diagnosis
-
 _SUSPICIOUS, _PLAIN = "tab:red", "tab:blue"
 
 
-def draw_diagnosis(diagnosis: Diagnosis, axes: Any = None) -> Any:
+def draw_diagnosis(diagnosis: Any, axes: Any = None) -> Any:
     """Draw a diagnosis; see :meth:`Diagnosis.plot`."""
     if axes is None:
         import matplotlib.pyplot as plt
@@ -26,7 +23,7 @@ def draw_diagnosis(diagnosis: Diagnosis, axes: Any = None) -> Any:
     return axes
 
 
-def _draw_calibration(diagnosis: Diagnosis, ax: Any) -> None:
+def _draw_calibration(diagnosis: Any, ax: Any) -> None:
     curve = diagnosis.calibration
     share = curve.n_transitions / max(curve.n_transitions.sum(), 1)
     places = (np.minimum(np.floor(curve.predicted * N_BINS), N_BINS - 1) + 0.5) / N_BINS
@@ -40,7 +37,7 @@ def _draw_calibration(diagnosis: Diagnosis, ax: Any) -> None:
     ax.legend(loc="upper left", fontsize="small")
 
 
-def _draw_recalls(diagnosis: Diagnosis, ax: Any) -> None:
+def _draw_recalls(diagnosis: Any, ax: Any) -> None:
     shares = {
         "accuracy": diagnosis.accuracy,
         "balanced\naccuracy": diagnosis.balanced_accuracy,
@@ -61,7 +58,7 @@ def _draw_recalls(diagnosis: Diagnosis, ax: Any) -> None:
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, frameon=False)
 
 
-def _draw_ranges(diagnosis: Diagnosis, ax: Any) -> None:
+def _draw_ranges(diagnosis: Any, ax: Any) -> None:
     low, high = diagnosis.feature_ranges.T
     columns = np.arange(len(low))
     odd = {*diagnosis.constant_features, *diagnosis.unscaled_features}
