@@ -12,7 +12,6 @@ import systems
 from systems import Box, Rope, RopeState, RopeStopReason, Scene, StopReason
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.paper_scenes import load_scene
-from systems.rope.rows import as_row_pair, as_rows
 from systems.rope.sampling import draw_grippers, draw_hanging_rope
 from systems.rope.scene import GRIPPER_CLEARANCE, ROPE_RADIUS, STEP_SIZE
 
@@ -81,40 +80,36 @@ def test_a_world_without_room_for_a_hanging_rope_says_so():
         Rope(scene).sample_problem(0)
 
 
-finite = st.floats(-1e6, 1e6)
-
-
 @settings(deadline=None, derandomize=True, max_examples=50)
-@given(st.lists(st.tuples(finite, finite, finite), max_size=4), st.sampled_from([0, 1, 2]))
-def test_rows_are_taken_as_they_are_and_refused_if_one_entry_is_not_finite(values, axis):
-    rows = np.array(values, dtype=np.float64).reshape(-1, 3)
-    assert as_rows(rows, "rows", 3) is rows
-    np.testing.assert_array_equal(as_rows(rows.astype(np.float32), "rows", 3), np.float32(rows))
-    for bad in (np.nan, np.inf, -np.inf):
-        broken = rows.copy()
-        if len(rows):
-            broken[-1, axis] = bad
-            with pytest.raises(ValueError, match="rows must be finite"):
-                as_rows(broken, "rows", 3)
+@given(st.integers(1, 4), st.integers(0, 10**6), st.sampled_from([np.nan, np.inf, -np.inf]))
+def test_rows_are_refused_if_one_entry_is_not_finite(n, place, bad):
+    rope = Rope("simple_hook_short")
+    rows = np.random.default_rng(place).normal(size=(n, rope.reduced_dim))
+    np.testing.assert_array_equal(rope.bands(rows), rows)
+    np.testing.assert_array_equal(rope.bands(rows.astype(np.float32)), np.float32(rows))
+    np.testing.assert_array_equal(rope.bands(rows.tolist()), rows)
+    rows.flat[place % rows.size] = bad
+    for check in (rope.bands, lambda b: rope.close(b, b), lambda b: rope.steer(b, b[:, :6])):
+        with pytest.raises(ValueError, match="must be finite, got NaN or infinity"):
+            check(rows)
 
 
 def test_what_is_no_array_of_rows_is_refused_by_name():
-    rows = np.zeros((2, 3))
+    rope = Rope("simple_hook_short")
+    rows = np.zeros((2, rope.reduced_dim))
     for given_rows, words in (
-        (rows[0], r"b must have the shape \(any, 3\), got \(3,?\)"),
-        (rows[:, :2], r"b must have the shape \(any, 3\), got \(2, 2\)"),
-        ("rows", "b must be an array of numbers"),
-        (None, "b must"),
-        ([[1, 2, 3], [4, 5]], "b must be an array of numbers"),
+        (rows[0], r"reduced must have the shape \(any, \d+\), got \(\d+,?\)"),
+        (rows[:, :2], r"reduced must have the shape \(any, \d+\), got \(2, 2\)"),
+        ("rows", "reduced must be an array of numbers"),
+        (None, "reduced must"),
+        ([[1, 2, 3], [4, 5]], "reduced must be an array of numbers"),
     ):
         with pytest.raises(ValueError, match=words):
-            as_rows(given_rows, "b", 3)
-    with pytest.raises(ValueError, match="u must have as many rows as b, 2, got 1"):
-        as_row_pair(rows, rows[:1], ("b", "u"), (3, 3))
-    with pytest.raises(ValueError, match="u must have the shape"):
-        as_row_pair(rows, rows, ("b", "u"), (3, 4))
-    first, second = as_row_pair(rows, rows[:, :1], ("b", "u"), (3, 1))
-    assert (first.shape, second.shape) == ((2, 3), (2, 1))
+            rope.steer(given_rows, rows[:, :6])
+    with pytest.raises(ValueError, match="command must have as many rows as reduced, 2, got 1"):
+        rope.propagate(rows, rows[:1, :6])
+    with pytest.raises(ValueError, match="configuration must have the shape"):
+        rope.steer(rows, rows[:, :4])
 
 
 seeds = st.integers(0, 2**32 - 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,6 @@ from systems.rope.band.propagation_kernels import propagate_bands
 from systems.rope.features.registry import FEATURES
 from systems.rope.gripper_kernels import allowed_moves, steer_grippers
 from systems.rope.paper_scenes import load_scene
-from systems.rope.rows import as_row_pair, as_rows
 from systems.rope.sampling import draw_grippers, draw_hanging_rope
 from systems.rope.scene import STEP_SIZE, Scene
 from systems.rope.simulation.engines import ENGINES
@@ -118,7 +118,7 @@ class Rope(System):
         another; grippers that were nearer before may not come nearer still. Neither the band nor
         a PBD rope may be overstretched. What is cheapest is checked first.
         """
-        rows, moves = as_row_pair(
+        rows, moves = _as_row_pair(
             reduced, command, ("reduced", "command"), (self.reduced_dim, self.configuration_dim)
         )
         packed = self.scene.packed
@@ -135,11 +135,11 @@ class Rope(System):
 
     def bands(self, reduced: Array) -> Array:
         """Return reduced states without the PBD ropes, for :mod:`systems.rope.band.band`."""
-        return self._bands(as_rows(reduced, "reduced", self.reduced_dim))
+        return self._bands(_as_rows(reduced, "reduced", self.reduced_dim))
 
     def steer(self, reduced: Array, configuration: Array) -> Array:
         """Return the displacement of at most one step, in R^6, towards gripper positions."""
-        rows, targets = as_row_pair(
+        rows, targets = _as_row_pair(
             reduced,
             configuration,
             ("reduced", "configuration"),
@@ -166,7 +166,7 @@ class Rope(System):
 
     def close(self, predicted: Array, executed: Array) -> NDArray[np.bool_]:
         """Say whether bands are near one another and of one homotopy class: Close."""
-        rows, others = as_row_pair(
+        rows, others = _as_row_pair(
             predicted, executed, ("predicted", "executed"), (self.reduced_dim, self.reduced_dim)
         )
         return bands_close(self._bands(rows), self._bands(others), self.scene)
@@ -234,3 +234,26 @@ class Rope(System):
 def _check_state(state: Any) -> None:
     if not isinstance(state, RopeState):
         raise ValueError(f"state must be a RopeState, got {state!r}.")
+
+
+def _as_rows(rows: Any, name: str, width: int) -> Array:
+    """Return finite float64 rows; those that are so already are returned as they are."""
+    fits = getattr(rows, "ndim", 0) == 2 and rows.shape[1] == width
+    # Planners ask for a few rows, thousands of times a second, and a product is finite only if all
+    # its numbers are: that costs a third of looking at each.
+    if fits and rows.dtype == np.float64 and math.isfinite(np.vdot(rows, rows)):
+        checked: Array = rows
+        return checked
+    return as_finite_array(rows, name, (None, width))
+
+
+def _as_row_pair(
+    first: ArrayLike, second: ArrayLike, names: tuple[str, str], widths: tuple[int, int]
+) -> tuple[Array, Array]:
+    """Return two arrays of finite float64 rows that belong together."""
+    rows, others = _as_rows(first, names[0], widths[0]), _as_rows(second, names[1], widths[1])
+    if len(rows) != len(others):
+        raise ValueError(
+            f"{names[1]} must have as many rows as {names[0]}, {len(rows)}, got {len(others)}."
+        )
+    return rows, others
