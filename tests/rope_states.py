@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from systems.rope.band.band import N_MATCHED
+from systems.rope.band.row_kernels import GRIPPERS_WIDTH, resample_row
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.slack.pbd_ropes import KINDS
 
@@ -18,6 +20,21 @@ def plain_resample(points, n):
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     at = np.linspace(0.0, arc[-1], n)
     return np.stack([np.interp(at, arc, points[:, axis]) for axis in range(3)], axis=1)
+
+
+def band_points(row):
+    """Points of one band, shape (n_points, 3), without the repeats of the last one."""
+    points = row[GRIPPERS_WIDTH:].reshape(-1, 3)
+    differs = (points[1:] != points[:-1]).any(axis=1)
+    return points[: max(2, int(differs.nonzero()[0].max(initial=0)) + 2)]
+
+
+def resample_bands(rows, n=N_MATCHED):
+    """Points evenly spaced along each row's band by the compiled loop, shape (n_rows, n, 3)."""
+    resampled = np.empty((len(rows), n, 3))
+    for row, points in zip(np.ascontiguousarray(rows), resampled, strict=True):
+        resample_row(row, points)
+    return resampled
 
 
 def pbd_nodes(ropes, grippers):

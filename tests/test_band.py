@@ -4,7 +4,7 @@ import hypothesis.strategies as st
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from rope_states import plain_resample, polyline_length
+from rope_states import band_points, plain_resample, polyline_length, resample_bands
 
 from systems import Rope, Scene
 from systems.errors import SimulationDivergedError
@@ -12,11 +12,9 @@ from systems.rope.band.band import (
     CLOSE_DISTANCE,
     N_MATCHED,
     band_length,
-    band_points,
     bands_close,
     reduce_rope,
     reduced_dim,
-    resample_bands,
 )
 from systems.rope.band.chain_kernels import CLEARANCE
 from systems.rope.band.comparison_kernels import compare_bands

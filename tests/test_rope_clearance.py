@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis.extra.numpy import arrays
-from rope_states import pbd_nodes
+from rope_states import band_points, pbd_nodes, resample_bands
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from planners import BiasedRRT
 from systems import Box, Rope, Scene, check_system
-from systems.rope.band.band import band_length, band_points, reduced_dim, resample_bands
+from systems.rope.band.band import band_length, reduced_dim
 from systems.rope.features.clearance import clearance_features, mirrored, reversed_ends
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.slack.pbd_ropes import KINDS, pbd_dim

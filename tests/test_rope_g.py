@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rope_states import pbd_nodes, polyline_length, slow_margin
+from rope_states import band_points, pbd_nodes, polyline_length, resample_bands, slow_margin
 
 from systems import Box, Capsule, Cylinder, Rope, Scene
 from systems.errors import SimulationDivergedError
 from systems.rope.band.band import (
     band_length,
-    band_points,
     reduce_rope,
     reduced_dim,
-    resample_bands,
 )
 from systems.rope.catenary import hanging_rope
 from systems.rope.obstacles.shapes import pack_obstacles

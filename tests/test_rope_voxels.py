@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from rope_states import resample_bands
 
 from systems import Box, Capsule, Cylinder, Rope, Scene, check_system
-from systems.rope.band.band import reduced_dim, resample_bands
+from systems.rope.band.band import reduced_dim
 from systems.rope.features.voxels import unpack_voxels, voxel_features
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.paper_scenes import SCENE_NAMES, load_scene

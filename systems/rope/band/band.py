@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from systems.errors import SimulationDivergedError
 from systems.rope.band.comparison_kernels import compare_bands
 from systems.rope.band.propagation_kernels import IN_OBSTACLE, TOO_MANY_POINTS, reduce_curve
-from systems.rope.band.row_kernels import GRIPPERS_WIDTH, fill_lengths, fill_resampled
+from systems.rope.band.row_kernels import GRIPPERS_WIDTH, fill_lengths
 from systems.rope.obstacles.shapes import Array
 from systems.rope.scene import Scene
 from systems.validation import as_finite_array
@@ -102,25 +102,11 @@ def bands_close(predicted: Array, executed: Array, scene: Scene) -> NDArray[np.b
     return close
 
 
-def resample_bands(reduced: Array, n_points: int = N_MATCHED) -> Array:
-    """Return evenly spaced points along each row's band, shape (n, n_points, 3)."""
-    points = np.empty((len(reduced), n_points, 3))
-    fill_resampled(np.ascontiguousarray(reduced), points)
-    return points
-
-
 def band_length(reduced: Array) -> Array:
     """Return the length of each row's band, metres, shape (n,)."""
     lengths = np.empty(len(reduced))
     fill_lengths(np.ascontiguousarray(reduced), lengths)
     return lengths
-
-
-def band_points(reduced: Array) -> Array:
-    """Return the points of one band, (n_points, 3), without the repeated last one."""
-    points = reduced[GRIPPERS_WIDTH:].reshape(-1, 3)
-    differs = (points[1:] != points[:-1]).any(axis=1)
-    return points[: max(2, int(differs.nonzero()[0].max(initial=0)) + 2)]
 
 
 def gripper_separation(reduced: Array) -> Array:

@@ -116,10 +116,3 @@ def resample_row(row: Any, points: Any) -> None:
     """Write points that are evenly spaced along the band, ends included."""
     spacing = length_of_band(row, False) / (points.shape[0] - 1)
     fill_points_along(row, 0.0, spacing, False, points)
-
-
-@compiled
-def fill_resampled(rows: Any, points: Any) -> None:
-    """Write evenly spaced points of each row's band."""
-    for i in range(rows.shape[0]):
-        resample_row(rows[i], points[i])
