@@ -49,7 +49,7 @@ class BatchRRT:
         system = problem.system
         self.tree = SearchTree(problem.starts, system.configuration_dim, system.angular)
         self._system = system
-        self._goals = problem.goals
+        self._problem = problem
         self._check = check
         self._rng = rng
         # The command that led to each node; none does to a root, whose entry is never read.
@@ -63,7 +63,7 @@ class BatchRRT:
         """Grow the tree until a node is a goal; return the path to it, or None without one."""
         at_goal = self._first_at_goal(np.arange(len(self.tree.reduced)))
         none = np.arange(0)
-        extensions, ended = _Extensions(self._goals[:0], none, none == 0, none), none
+        extensions, ended = _Extensions(self._problem.goals[:0], none, none == 0, none), none
         while at_goal is None:
             n_idle = EXTENSIONS_PER_ROUND - len(extensions.nodes)
             if budget.exhausted(n_idle):
@@ -75,7 +75,7 @@ class BatchRRT:
         return Path(self.tree.reduced[nodes], np.concatenate(self._commands)[nodes[1:]])
 
     def _first_at_goal(self, nodes: NDArray[np.int64]) -> int | None:
-        reached = self._system.goal_reached(self.tree.reduced[nodes], self._goals)
+        reached = self._system.goal_reached(self.tree.reduced[nodes], self._problem.goals)
         return int(nodes[np.argmax(reached)]) if reached.any() else None
 
     def _started(self, n: int, ended: NDArray[np.int64]) -> _Extensions:
@@ -83,7 +83,9 @@ class BatchRRT:
         fresh = np.array([node for node in ended if node not in self._tried_goal], dtype=np.int64)
         to_goal = fresh[self._rng.random(len(fresh)) < GOAL_BIAS]
         self._tried_goal.update(to_goal.tolist())
-        goals = self._goals[self._rng.integers(len(self._goals), size=len(to_goal))]
+        self._problem.draw_goals(len(to_goal))
+        goals = self._problem.goals
+        goals = goals[self._rng.integers(len(goals), size=len(to_goal))]
         samples = self._system.sample_configurations(self._rng, n - len(to_goal))
         return _Extensions(
             targets=np.concatenate([goals, samples]),

@@ -13,6 +13,7 @@ from systems.angles import shortest_way, wrap_columns
 from systems.system import Array
 
 EXTENSIONS_PER_ROUND = 8
+GOALS_PER_ROUND = 4
 
 
 class BatchRRTConnect:
@@ -20,7 +21,8 @@ class BatchRRTConnect:
 
     A round draws a few samples, extends one tree towards each by an edge, and then connects the
     other tree to every new state, edge by edge, until it is blocked or arrives; the trees swap
-    roles after each round. All edges of one depth are checked in one call.
+    roles after each round. All edges of one depth are checked in one call. Where the goal is a
+    region, the tree that grows from the goals gets further ones as it grows.
 
     Parameters
     ----------
@@ -37,6 +39,7 @@ class BatchRRTConnect:
         longest_edge: float,
         rng: np.random.Generator,
     ) -> None:
+        self._problem = problem
         self._bounds = problem.system.bounds
         self._angular = problem.system.angular
         dim = problem.system.configuration_dim
@@ -50,6 +53,7 @@ class BatchRRTConnect:
         """Grow the trees until they meet; return the path's vertices, or None without one."""
         tree, other = self._from_start, self._to_goal
         while not budget.exhausted(EXTENSIONS_PER_ROUND):
+            self._add_goals()
             low, high = self._bounds
             samples = self._rng.uniform(low, high, size=(EXTENSIONS_PER_ROUND, len(low)))
             added, _ = self._extend(tree, samples, tree.nearest(samples))
@@ -59,6 +63,12 @@ class BatchRRTConnect:
                 return self._path(tree, int(added[target]), other, arrived)
             tree, other = other, tree
         return None
+
+    def _add_goals(self) -> None:
+        """Keep a region's goals at half of the nodes of their tree, as OMPL's RRT-Connect does."""
+        if 2 * len(self._problem.goals) < len(self._to_goal.reduced):
+            drawn = self._problem.draw_goals(GOALS_PER_ROUND)
+            self._to_goal.add(drawn, np.full(len(drawn), -1))
 
     def _extend(
         self, tree: SearchTree, targets: Array, nearest: NDArray[np.int64]

@@ -25,6 +25,7 @@ from planners.result import PlanResult, PlanStatus
 from planners.shortcutting import shorten
 from planners.shortcutting_repropagated import RepropagatedShortcuts
 from planners.success_calibration import SuccessCalibration
+from systems.goal_region import GoalRegion
 from systems.system import Array, System
 from systems.validation import RandomState, as_seed, check_count, check_number, is_integer
 
@@ -88,16 +89,21 @@ class BiasedPlanner(BaseEstimator):
     def _search(self, search: Search) -> Found:
         """Look for a path from a start to a goal."""
 
-    def plan(self, start_reduced: ArrayLike, goal: ArrayLike) -> PlanResult:
+    def plan(self, start_reduced: ArrayLike, goal: ArrayLike | GoalRegion) -> PlanResult:
         """Plan from a reduced state to a goal.
 
         Parameters
         ----------
         start_reduced : ndarray of shape (reduced_dim,)
-        goal : ndarray of shape (n_goals, configuration_dim) or (configuration_dim,)
-            Configurations, any of which will do. Goals at which the estimator calls even
-            standing still Unreliable are left out; if it does so at all of them, the one that is
-            most probably Reliable is kept.
+            May lie out of the system's bounds, which limit where planners sample, but no farther
+            than these are wide; ``propagate`` has to be valid for standing still there. Angles
+            are brought to [-π, π), as those of the goal are.
+        goal : GoalRegion, or ndarray of shape (n_goals, configuration_dim) or (configuration_dim,)
+            Configurations, any of which will do, or a region to draw them from. Those that are
+            not finite, out of bounds, or where ``propagate`` is not valid for standing still are
+            left out, as long as others remain. So are those at which the estimator calls even
+            standing still Unreliable; if it does so at all of them, the one that is most probably
+            Reliable is kept.
 
         Returns
         -------
@@ -115,7 +121,7 @@ class BiasedPlanner(BaseEstimator):
     def plan_from_any(
         self,
         starts_reduced: Sequence[ArrayLike],
-        goal: ArrayLike,
+        goal: ArrayLike | GoalRegion,
         terminated: Callable[[], bool] = never,
     ) -> PlanResult:
         """Plan from any of several reduced states, until told to stop.
@@ -123,7 +129,7 @@ class BiasedPlanner(BaseEstimator):
         Parameters
         ----------
         starts_reduced : sequence of ndarray of shape (reduced_dim,)
-        goal : ndarray of shape (n_goals, configuration_dim) or (configuration_dim,)
+        goal : GoalRegion, or ndarray of shape (n_goals, configuration_dim) or (configuration_dim,)
             As in :meth:`plan`.
         terminated : callable, default=never
             Asked before each round of the search, which stops when the answer is True.
@@ -138,7 +144,10 @@ class BiasedPlanner(BaseEstimator):
         return self._judged(best)
 
     def _attempts(
-        self, starts: Sequence[ArrayLike], goal: ArrayLike, terminated: Callable[[], bool]
+        self,
+        starts: Sequence[ArrayLike],
+        goal: ArrayLike | GoalRegion,
+        terminated: Callable[[], bool],
     ) -> Iterator[PlanResult]:
         """Plan with one seed after another, until nothing is left of the time."""
         seed, limit = as_seed(self.random_state), self.time_limit
@@ -154,7 +163,7 @@ class BiasedPlanner(BaseEstimator):
         seed: int,
         time_limit: float | None,
         starts: Sequence[ArrayLike],
-        goal: ArrayLike,
+        goal: ArrayLike | GoalRegion,
         terminated: Callable[[], bool],
     ) -> PlanResult:
         began = time.perf_counter()
@@ -238,7 +247,7 @@ class BiasedPlanner(BaseEstimator):
         self,
         seed: int,
         starts: Sequence[ArrayLike],
-        goal: ArrayLike,
+        goal: ArrayLike | GoalRegion,
         budget: Budget,
     ) -> Search:
         for_search, for_ompl = np.random.SeedSequence(seed).spawn(2)
@@ -246,7 +255,8 @@ class BiasedPlanner(BaseEstimator):
         check = CheckTransition(
             self.system, self.estimator, k=self.k, accuracy=self.accuracy, rng=rng
         )
-        problem = PlanningProblem.checked(self.system, starts, goal).with_trusted_goals(check)
+        problem = PlanningProblem.checked(self.system, starts, goal, rng)
+        problem = problem.with_trusted_goals(check)
         # OMPL ignores a seed of zero.
         return Search(problem, check, budget, rng, 1 + int(for_ompl.generate_state(1)[0]))
 

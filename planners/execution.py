@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.distrust import DistrustedTransitions
+from planners.goals import has_succeeded
 from planners.planning_problem import can_start
 from reliability.scenes import SceneFamily
 from systems.errors import SimulationDivergedError
@@ -36,7 +37,7 @@ class ExecutionStatus(Enum):
         "says which. Allow more replans (max_replans), or plan with an estimator."
     )
     START_NOT_ALLOWED = (
-        "The system left its plan and was where no plan may start: out of the system's bounds, or "
+        "The system left its plan and was where no plan may start: far out of its bounds, or "
         "where propagate is not valid even for standing still. Make bounds and propagate allow "
         "what the true system can come to, or plan with an estimator that keeps away from there."
     )
@@ -271,7 +272,7 @@ class _Run:
         self._distrusted.add(*((before, following[0]) if valid[0] else planned))
 
     def _arrived(self) -> bool:
-        return bool(self.system.succeeded(self.states[-1], self.problem.goal, self.tolerance))
+        return has_succeeded(self.system, self.problem, self.states[-1], self.tolerance)
 
     def _reduced(self) -> Array:
         return self.system.reduce(self.states[-1])

@@ -68,6 +68,17 @@ def ompl_rrt_connect(
             information.setMotionValidator(_AnyMotion(information))
 
 
+def ompl_can_search(problem: PlanningProblem) -> bool:
+    """Say whether OMPL's RRT-Connect can solve a problem as ours does.
+
+    It refuses starts out of bounds, adds up the distances of a compound space where we want the
+    Euclidean one, and is given configurations as goals, all of them before it begins.
+    """
+    low, high = problem.system.bounds
+    within = ((problem.starts >= low) & (problem.starts <= high)).all()
+    return bool(within) and not problem.system.angular and problem.sampler is None
+
+
 def _simple_setup(problem: PlanningProblem) -> Any:
     setup = og.SimpleSetup(_space(problem.system.bounds))
     information = setup.getSpaceInformation()

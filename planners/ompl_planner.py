@@ -10,6 +10,7 @@ from ompl import base as ob
 from ompl import geometric as og
 
 from planners.result import PlanResult
+from systems.angles import wrap_columns
 from systems.system import Array, System
 from systems.validation import as_finite_array
 
@@ -145,7 +146,8 @@ class OmplPlanner(ob.Planner):
     def _configuration(self, state: Any) -> Array:
         space = self.getSpaceInformation().getStateSpace()
         n = self._planner.system.configuration_dim
-        return np.array([space.getValueAddressAtIndex(state, i) for i in range(n)])
+        values = np.array([space.getValueAddressAtIndex(state, i) for i in range(n)])
+        return wrap_columns(values, self._planner.system.angular)
 
     def _states(self, reduced: Array) -> list[Any]:
         """Make OMPL states of the leading columns of an array, row by row."""

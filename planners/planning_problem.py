@@ -6,14 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from planners.check_transition import CheckTransition
+from planners.goals import BATCH, MOST_BATCHES, GoalSampler, possible_goals, trusted
+from planners.standing_still import can_stay, is_only_configuration
+from systems.angles import wrap_columns
+from systems.goal_region import GoalRegion
 from systems.system import Array, System
-from systems.validation import as_finite_array, check_within_bounds
+from systems.validation import as_finite_array
+
+MOST_GOALS = 1000
 
 
-@dataclass(frozen=True)
+@dataclass
 class PlanningProblem:
     """A system, the states to start from and the configurations to reach.
 
@@ -23,48 +29,103 @@ class PlanningProblem:
     starts : ndarray of shape (n_starts, reduced_dim)
         Reduced states; a plan begins at any one of them.
     goals : ndarray of shape (n_goals, configuration_dim)
-        Configurations; a plan ends at any one of them.
+        Configurations; a plan ends at any one of them. Of a region, those drawn so far.
+    sampler : GoalSampler or None, default=None
+        Draws further goals where the goal is a region.
     """
 
     system: System
     starts: Array
     goals: Array
+    sampler: GoalSampler | None = None
 
     @classmethod
     def checked(
-        cls, system: System, starts: Sequence[ArrayLike], goals: ArrayLike
+        cls,
+        system: System,
+        starts: Sequence[ArrayLike],
+        goal: ArrayLike | GoalRegion,
+        rng: np.random.Generator,
     ) -> PlanningProblem:
-        """Make a problem of a user's starts and goals.
+        """Make a problem of a user's starts and goals; bring their angles to [-π, π).
 
-        Goals that g forbids are left out, as long as one remains. Whether it does is only known
-        where the reduced state is nothing but a configuration.
+        Starts may lie out of bounds, which limit where planners sample: a system that has come
+        there has to be planned for. Goals that are not finite, out of bounds or forbidden by g are
+        left out, as long as one remains. Whether g forbids one is only known where the reduced
+        state is nothing but a configuration.
 
         Raises
         ------
         ValueError
-            If a start or goal has the wrong shape, is not finite or is out of bounds, if g allows
-            no transition from a start, or if no goal can be reached.
+            If a start or goal has the wrong shape, if a start is not finite or farther outside
+            the bounds than these are wide, if g allows no transition from a start, or if no goal
+            can be reached.
         """
-        return cls(system, _checked_starts(system, starts), _checked_goals(system, goals))
+        at = _checked_starts(system, starts)
+        if not isinstance(goal, GoalRegion):
+            return cls(system, at, possible_goals(system, goal))
+        sampler = GoalSampler(system, goal, rng)
+        return cls(system, at, sampler.first(at), sampler)
 
     def with_trusted_goals(self, check: CheckTransition) -> PlanningProblem:
         """Leave out goals at which the estimator calls even standing still Unreliable.
 
-        If it does so at all of them, the one that is most probably Reliable is kept.
+        If it does so at all of them, the one that is most probably Reliable is kept; of a region,
+        after many were drawn.
         """
-        if len(self.goals) == 1 or not _only_configuration(self.system):
+        if self.sampler is not None:
+            return self._with_trusted_sampler(self.sampler, check)
+        if len(self.goals) == 1 or not is_only_configuration(self.system):
             return self
-        trusted = check.classify(self.goals, self.goals)
-        if not trusted.any():
-            trusted[np.argmax(check.probability(self.goals, self.goals))] = True
-        return replace(self, goals=self.goals[trusted])
+        return replace(self, goals=_most_trusted(self.system, self.goals, check))
+
+    def draw_goals(self, n: int) -> Array:
+        """Add at most n further goals of a region to ``goals``, and return them.
+
+        None where the goal is not a region, or where more goals would only slow the search down.
+        """
+        if self.sampler is None or len(self.goals) >= MOST_GOALS:
+            return self.goals[:0]
+        drawn = self.sampler.draw(n)
+        self.goals = np.concatenate([self.goals, drawn])
+        return drawn
+
+    def _with_trusted_sampler(
+        self, sampler: GoalSampler, check: CheckTransition
+    ) -> PlanningProblem:
+        goals = self.goals
+        for _ in range(MOST_BATCHES):
+            if trusted(self.system, goals, check).any():
+                break
+            goals = np.concatenate([goals, sampler.draw(BATCH)])
+        most_trusted = _most_trusted(self.system, goals, check)
+        return replace(self, goals=most_trusted, sampler=replace(sampler, check=check))
+
+
+def can_start(system: System, reduced: Array) -> bool:
+    """Say whether planning may begin at a reduced state: where g allows standing still.
+
+    It may lie out of the system's bounds, but no farther than these are wide.
+    """
+    if not np.isfinite(reduced).all():
+        return False
+    start = wrap_columns(reduced[None], system.angular)
+    return not _is_too_far(system, start[0]) and bool(can_stay(system, start)[0])
 
 
 def _checked_starts(system: System, starts: Sequence[ArrayLike]) -> Array:
     shape = (system.reduced_dim,)
     checked = np.array([as_finite_array(start, "start_reduced", shape) for start in starts])
-    check_within_bounds(checked[:, : system.configuration_dim], system.bounds, "start_reduced")
-    blocked = ~_can_stay(system, checked)
+    checked = wrap_columns(checked, system.angular)
+    for start in checked:
+        if _is_too_far(system, start):
+            low, high = system.bounds.tolist()
+            raise ValueError(
+                f"start_reduced must lie near the bounds {low} to {high}, no farther outside than "
+                f"they are wide, got {start[: system.configuration_dim].tolist()}. Is it in the "
+                "system's units?"
+            )
+    blocked = ~can_stay(system, checked)
     if blocked.any():
         raise ValueError(
             "start_reduced must be a state from which propagate is valid, "
@@ -73,34 +134,16 @@ def _checked_starts(system: System, starts: Sequence[ArrayLike]) -> Array:
     return checked
 
 
-def can_start(system: System, reduced: Array) -> bool:
-    """Say whether planning may begin at a reduced state: it is in bounds, and g can stay there."""
-    configuration, (low, high) = reduced[: system.configuration_dim], system.bounds
-    within = bool(((configuration >= low) & (configuration <= high)).all())
-    return within and bool(_can_stay(system, reduced[None])[0])
+def _is_too_far(system: System, start: Array) -> bool:
+    configuration, (low, high) = start[: system.configuration_dim], system.bounds
+    beyond = np.maximum(low - configuration, configuration - high)
+    beyond[list(system.angular)] = 0
+    return bool((beyond > high - low).any())
 
 
-def _checked_goals(system: System, goals: ArrayLike) -> Array:
-    checked = as_finite_array(np.atleast_2d(goals), "goal", (None, system.configuration_dim))
-    if len(checked) == 0:
-        raise ValueError("goal must hold at least one configuration, got none.")
-    check_within_bounds(checked, system.bounds, "goal")
-    if not _only_configuration(system):
-        return checked
-    possible = _can_stay(system, checked)
-    if not possible.any():
-        raise ValueError(
-            "goal must hold a configuration that can be reached: propagate is not valid at "
-            f"any of the {len(checked)}, such as {checked[0]}."
-        )
-    return checked[possible]
-
-
-def _only_configuration(system: System) -> bool:
-    return system.reduced_dim == system.configuration_dim
-
-
-def _can_stay(system: System, reduced: Array) -> NDArray[np.bool_]:
-    """Say, row by row, whether g allows the transition that goes nowhere."""
-    command = system.steer(reduced, reduced[:, : system.configuration_dim])
-    return system.propagate(reduced, command)[1]
+def _most_trusted(system: System, goals: Array, check: CheckTransition) -> Array:
+    """Return the goals that are trusted, or the one that comes nearest to it."""
+    kept = trusted(system, goals, check)
+    if not kept.any():
+        kept[np.argmax(check.probability(goals, goals))] = True
+    return goals[kept]

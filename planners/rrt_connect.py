@@ -10,7 +10,7 @@ from planners.batch_rrt_connect import BatchRRTConnect
 from planners.biased_planner import BiasedPlanner, Found, Search
 from planners.edge_checker import EdgeChecker
 from planners.edge_discretization import split_edges
-from planners.ompl_backend import ompl_rrt_connect
+from planners.ompl_backend import ompl_can_search, ompl_rrt_connect
 from planners.path import Path
 from systems.system import Array
 from systems.validation import check_count
@@ -22,8 +22,9 @@ class BiasedRRTConnect(BiasedPlanner):
 
     For systems whose reduced state is only a configuration, and which can be steered exactly from
     one configuration to another. OMPL's own RRT-Connect searches when the estimator answers
-    quickly for single transitions; for all other estimators, and for configurations with angles
-    that wrap, one that asks about the edges of several extensions at a time.
+    quickly for single transitions; for all other estimators, for configurations with angles that
+    wrap, for goal regions and for starts out of bounds, one that asks about the edges of several
+    extensions at a time.
 
     Parameters
     ----------
@@ -90,8 +91,7 @@ class BiasedRRTConnect(BiasedPlanner):
     def _vertices(self, search: Search, checker: EdgeChecker) -> Array | None:
         problem, budget = search.problem, search.budget
         longest_edge = self.transitions_per_edge * self.system.step_size
-        # OMPL adds up the distances of a compound space where we want the Euclidean one.
-        if search.check.answers_fast and not self.system.angular:
+        if search.check.answers_fast and ompl_can_search(problem):
             return ompl_rrt_connect(problem, checker, longest_edge, budget, search.ompl_seed)
         return BatchRRTConnect(problem, checker, longest_edge, search.rng).grow(budget)
 

@@ -30,7 +30,7 @@ class Planner(Protocol):
     system: Any
     random_state: Any
 
-    def plan(self, start_reduced: NDArray[np.float64], goal: NDArray[np.float64]) -> Any:
+    def plan(self, start_reduced: NDArray[np.float64], goal: Any) -> Any:
         """Return a result with ``success``, ``reduced`` and ``commands``."""
 
 

@@ -8,6 +8,7 @@ from .car.scenes import random_car_scene as random_car_scene
 from .contract_checks.check_system import check_system as check_system
 from .errors import SimulationDivergedError as SimulationDivergedError
 from .errors import SystemContractError as SystemContractError
+from .goal_region import GoalRegion as GoalRegion
 from .planar_arm.planar_arm import PlanarArm as PlanarArm
 from .rope.obstacles.shapes import Box as Box
 from .rope.obstacles.shapes import Capsule as Capsule

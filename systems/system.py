@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from systems.goal_region import GoalRegion
 from systems.validation import RandomState
 
 Array = NDArray[np.float64]
@@ -35,12 +36,12 @@ class Problem:
     ----------
     start : object
         A true state, the paper's x_0.
-    goal : ndarray of shape (n_goals, configuration_dim)
-        Goal configurations; a plan has to reach one of them.
+    goal : ndarray of shape (n_goals, configuration_dim), or GoalRegion
+        Goal configurations, of which a plan has to reach one, or a region to draw them from.
     """
 
     start: Any
-    goal: Array
+    goal: Array | GoalRegion
 
 
 @dataclass(frozen=True)

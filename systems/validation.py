@@ -94,10 +94,8 @@ def check_rows(rows: str, n_columns: int, *arrays: Any) -> None:
             )
 
 
-def as_finite_array(
-    values: ArrayLike, name: str, shape: tuple[int | None, ...]
-) -> NDArray[np.float64]:
-    """Return ``values`` as a float64 array, after checking its shape and that it is finite.
+def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
+    """Return ``values`` as a float64 array, after checking its shape.
 
     Parameters
     ----------
@@ -115,7 +113,7 @@ def as_finite_array(
     Raises
     ------
     ValueError
-        If the shape differs, or if a value is NaN, infinite or not a real number.
+        If the shape differs, or if a value is not a real number.
     """
     array = _as_floats(values, name)
     fits = array.ndim == len(shape) and all(
@@ -124,6 +122,29 @@ def as_finite_array(
     if not fits:
         wanted = "(" + ", ".join("any" if want is None else str(want) for want in shape) + ")"
         raise ValueError(f"{name} must have the shape {wanted}, got {array.shape}.")
+    return array
+
+
+def as_finite_array(
+    values: ArrayLike, name: str, shape: tuple[int | None, ...]
+) -> NDArray[np.float64]:
+    """Return what :func:`as_array` does, after checking that it is finite.
+
+    Parameters
+    ----------
+    values, name, shape
+        As in :func:`as_array`.
+
+    Returns
+    -------
+    array : ndarray of float64
+
+    Raises
+    ------
+    ValueError
+        Also if a value is NaN or infinite.
+    """
+    array = as_array(values, name, shape)
     if not np.isfinite(array).all():
         raise ValueError(f"{name} must be finite, got NaN or infinity in {_shortened(array)}.")
     return array

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from systems import Problem, Rollout, SimulationDivergedError, StopReason, System
+from systems import GoalRegion, Problem, Rollout, SimulationDivergedError, StopReason, System
 from systems.angles import shortest_way, wrap_columns
 from systems.validation import as_generator
 
@@ -121,3 +121,28 @@ class Unstable(Disc):
         if max(point[1] for point in rollout.states) > 0.5:
             raise SimulationDivergedError("y is more than the simulator bears.")
         return rollout
+
+
+class RightOf(GoalRegion):
+    """All configurations at or beyond an x; half of the draws lie out of the disc world."""
+
+    def __init__(self, x):
+        self.x = x
+
+    def sample(self, rng, n):
+        return rng.uniform([self.x, -2.0], [1.0, 2.0], size=(n, 2))
+
+    def distance(self, configurations):
+        return np.maximum(self.x - configurations[:, 0], 0)
+
+
+class Shore(Disc):
+    """The disc world, from the left of whose problems it has to be crossed to a region."""
+
+    def __init__(self, x=0.8, sticky=False):
+        super().__init__(sticky)
+        self.x = x
+
+    def sample_problem(self, random_state=None):
+        rng = as_generator(random_state)
+        return Problem(rng.uniform([-0.9, -0.9], [-0.5, 0.9]), RightOf(self.x))

@@ -1,8 +1,6 @@
-"""Checks of a system's attributes and of its pickling."""
+"""Checks of a system's attributes."""
 
 from __future__ import annotations
-
-import pickle
 
 import numpy as np
 
@@ -22,6 +20,7 @@ def check_attributes(system: System) -> None:
         fail(system, "step_size", f"must be a positive number, got {step!r}.")
     _check_bounds(system)
     _check_angular(system)
+    _check_independent_parts(system)
 
 
 def _check_dimensions(system: System) -> None:
@@ -45,8 +44,8 @@ def _check_bounds(system: System) -> None:
         fail(
             system,
             "bounds",
-            f"must be an array of shape {shape}, the lower limits in the first row and the upper "
-            f"ones in the second, got {got}.",
+            f"must be a numpy array of shape {shape}, the lower limits in the first row and the "
+            f"upper ones in the second, got {got}.",
         )
     low, high = bounds
     if not (np.isfinite(low) & np.isfinite(high) & (low < high)).all():
@@ -67,12 +66,19 @@ def _check_angular(system: System) -> None:
         fail(system, "bounds", f"must lie in [-π, π] for angles, got {limits.tolist()}.")
 
 
-def check_pickles(system: System) -> None:
-    """Check that a system can be sent to another process."""
-    try:
-        pickle.loads(pickle.dumps(system))
-    except Exception as error:
-        raise SystemContractError(
-            f"{type(system).__name__} does not pickle ({error}); leave simulators and other "
-            "handles out of __getstate__ and start them when they are first needed."
-        ) from error
+def _check_independent_parts(system: System) -> None:
+    parts, dim = system.independent_parts, system.configuration_dim
+    slices = isinstance(parts, tuple) and all(isinstance(part, slice) for part in parts)
+    if not slices or not all(_lies_within(part, dim) for part in parts):
+        fail(
+            system,
+            "independent_parts",
+            f"must be a tuple of slices of the {dim} entries of a configuration, such as "
+            f"(slice(0, 3), slice(3, 6)), or () if there are none, got {parts!r}.",
+        )
+
+
+def _lies_within(part: slice, dim: int) -> bool:
+    ends = [end for end in (part.start, part.stop) if end is not None]
+    fits = all(is_integer(end) and -dim <= end <= dim for end in ends)
+    return fits and part.step in (None, 1) and len(range(dim)[part]) > 0

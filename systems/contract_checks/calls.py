@@ -14,12 +14,12 @@ from systems.system import Array, System
 ROUNDING = 1e-9
 
 
-def fail(system: System, name: str, complaint: str) -> NoReturn:
+def fail(system: Any, name: str, complaint: str, cause: Exception | None = None) -> NoReturn:
     """Raise a SystemContractError on a method or an attribute."""
-    raise SystemContractError(f"{type(system).__name__}.{name} {complaint}")
+    raise SystemContractError(f"{type(system).__name__}.{name} {complaint}") from cause
 
 
-def call(system: System, method: str, *arguments: Any) -> Any:
+def call(system: Any, method: str, *arguments: Any) -> Any:
     """Call a method, and report an exception as a breach of the contract."""
     try:
         return getattr(system, method)(*arguments)
@@ -29,7 +29,36 @@ def call(system: System, method: str, *arguments: Any) -> Any:
         ) from error
 
 
-def call_twice(system: System, method: str, *arguments: Any) -> Any:
+def call_with_zero_rows(
+    system: System, method: str, *arrays: Array, rest: tuple[Any, ...] = ()
+) -> Any:
+    """Call a method with zero rows of some arrays, and with the rest of its arguments."""
+    none = [array[:0] for array in arrays]
+    try:
+        return getattr(system, method)(*none, *rest)
+    except Exception as error:
+        shapes = " and ".join(str(array.shape) for array in none)
+        fail(
+            system,
+            method,
+            f"raised {type(error).__name__} for zero rows, arrays of shape {shapes}: {error}. "
+            "Planners also ask about none; answer zero rows with zero rows.",
+            error,
+        )
+
+
+def check_zero_rows(system: System, method: str, answer: Any, shape: tuple[int, ...]) -> None:
+    """Demand that the answer to zero rows is an array of zero rows."""
+    if not isinstance(answer, np.ndarray) or answer.shape != shape:
+        got = answer.shape if isinstance(answer, np.ndarray) else repr(answer)
+        fail(
+            system,
+            method,
+            f"must answer zero rows with zero rows, an array of shape {shape}, got {got}.",
+        )
+
+
+def call_twice(system: Any, method: str, *arguments: Any) -> Any:
     """Call a method twice; demand equal results and that it leaves its arguments as they are."""
     before = copy.deepcopy(arguments)
     result = call(system, method, *arguments)
@@ -56,7 +85,7 @@ def _equal_values(one: Any, other: Any) -> bool:
     return bool(np.all(one == other))
 
 
-def check_array(system: System, method: str, array: Any, shape: tuple[int, ...]) -> None:
+def check_array(system: Any, method: str, array: Any, shape: tuple[int, ...]) -> None:
     """Demand a finite float64 array of the given shape."""
     if not isinstance(array, np.ndarray) or array.dtype != np.float64:
         kind = getattr(array, "dtype", type(array).__name__)

@@ -7,9 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from systems.contract_checks.calls import call, call_twice, check_booleans, fail, same
+from systems.contract_checks.calls import (
+    call,
+    call_twice,
+    call_with_zero_rows,
+    check_booleans,
+    check_zero_rows,
+    fail,
+    same,
+)
 from systems.contract_checks.model import check_reduce
 from systems.contract_checks.sampling import draw_configurations
+from systems.goal_region import GoalRegion
 from systems.system import Array, Problem, Rollout, StopReason, System
 
 N_STEPS = 5
@@ -78,12 +87,21 @@ def _check_counts(system: System, rollout: Rollout, n_commands: int) -> None:
         )
 
 
-def check_goals(system: System, problem: Problem, executed: Rollout) -> None:
-    """Check ``goal_reached`` and ``succeeded`` on the states of an execution."""
+def check_goals(system: System, problem: Problem, goals: Array, executed: Rollout) -> None:
+    """Check ``goal_reached`` and ``succeeded`` on the states of an execution.
+
+    Where the goal is a region, ``goals`` are drawn from it, and ``succeeded`` is never asked.
+    """
     reduced = np.array([system.reduce(state) for state in executed.states])
-    reached = call_twice(system, "goal_reached", reduced, problem.goal)
+    reached = call_twice(system, "goal_reached", reduced, goals)
     check_booleans(system, "goal_reached", reached, len(reduced))
-    last = executed.states[-1]
+    none = call_with_zero_rows(system, "goal_reached", reduced, rest=(goals,))
+    check_zero_rows(system, "goal_reached", none, (0,))
+    if not isinstance(problem.goal, GoalRegion):
+        _check_success(system, problem, executed.states[-1])
+
+
+def _check_success(system: System, problem: Problem, last: Any) -> None:
     for tolerance in (SMALLEST_TOLERANCE, np.inf):
         succeeded = call_twice(system, "succeeded", last, problem.goal, tolerance)
         if not isinstance(succeeded, bool | np.bool_):

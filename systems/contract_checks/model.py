@@ -11,9 +11,11 @@ from systems.angles import shortest_way
 from systems.contract_checks.calls import (
     call,
     call_twice,
+    call_with_zero_rows,
     check_array,
     check_booleans,
     check_rowwise,
+    check_zero_rows,
     fail,
 )
 from systems.system import Array, System
@@ -28,6 +30,7 @@ def check_reduce(system: System, state: Any) -> Array:
     """Check ``reduce``, and return the reduced state."""
     reduced = call_twice(system, "reduce", state)
     check_array(system, "reduce", reduced, (system.reduced_dim,))
+    _check_angles(system, "reduce", reduced)
     return reduced
 
 
@@ -39,6 +42,8 @@ def check_steer(system: System, reduced: Array, targets: Array) -> Array:
         fail(system, "steer", f"must return one command per row, (n, command_dim), got {shape}.")
     check_array(system, "steer", command, command.shape)
     check_rowwise(system, "steer", reduced, targets)
+    none = call_with_zero_rows(system, "steer", reduced, targets)
+    check_zero_rows(system, "steer", none, (0, command.shape[1]))
     return command
 
 
@@ -56,11 +61,26 @@ def check_propagate(system: System, reduced: Array, command: Array) -> tuple[Arr
             f"must return next_reduced of shape {reduced.shape}, got {np.shape(next_reduced)}.",
         )
     check_array(system, "propagate", next_reduced[valid], (valid.sum(), system.reduced_dim))
-    angles = next_reduced[valid][:, list(system.angular)]
-    if ((angles < -np.pi) | (angles >= np.pi)).any():
-        fail(system, "propagate", "must return angles in [-π, π).")
+    _check_angles(system, "propagate", next_reduced[valid])
     check_rowwise(system, "propagate", reduced[valid], command[valid])
+    none = call_with_zero_rows(system, "propagate", reduced, command)
+    if not isinstance(none, tuple) or len(none) != 2:
+        fail(system, "propagate", f"must answer zero rows with zero rows, got {none!r}.")
+    check_zero_rows(system, "propagate", none[0], (0, system.reduced_dim))
+    check_zero_rows(system, "propagate", none[1], (0,))
     return next_reduced, valid
+
+
+def _check_angles(system: System, method: str, reduced: Array) -> None:
+    angles = reduced[..., list(system.angular)]
+    outside = (angles < -np.pi) | (angles >= np.pi)
+    if outside.any():
+        fail(
+            system,
+            method,
+            f"must return angles in [-π, π), got {angles[outside][0]:.6g}; "
+            "systems.wrap_columns brings them there.",
+        )
 
 
 def check_steps(system: System, reduced: Array, next_reduced: Array) -> None:
@@ -93,6 +113,8 @@ def check_close(system: System, reduced: Array, next_reduced: Array) -> None:
     check_booleans(system, "close", close, len(reduced))
     if not call(system, "close", reduced, reduced).all():
         fail(system, "close", "says that a reduced state is not close to itself.")
+    none = call_with_zero_rows(system, "close", reduced, next_reduced)
+    check_zero_rows(system, "close", none, (0,))
 
 
 def check_features(system: System, reduced: Array, next_reduced: Array) -> None:
@@ -103,11 +125,5 @@ def check_features(system: System, reduced: Array, next_reduced: Array) -> None:
     if rows.dtype.kind not in "fiub" or not np.isfinite(rows).all():
         fail(system, "features", f"must return finite numbers, got {rows.dtype}: {rows[0]}.")
     check_rowwise(system, "features", reduced, next_reduced)
-    none = call_twice(system, "features", reduced[:0], next_reduced[:0])
-    if np.shape(none) != (0, rows.shape[1]):
-        fail(
-            system,
-            "features",
-            f"of no transitions must return an array of shape (0, {rows.shape[1]}), got "
-            f"{np.shape(none)}.",
-        )
+    none = call_with_zero_rows(system, "features", reduced, next_reduced)
+    check_zero_rows(system, "features", none, (0, rows.shape[1]))
