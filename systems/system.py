@@ -74,8 +74,28 @@ class System(ABC):
     A *reduced state* b is a float64 vector of length ``reduced_dim``. Its first
     ``configuration_dim`` entries are the *configuration* q: planners sample configurations,
     measure distances between them and steer from one to another. The other entries follow from
-    :meth:`propagate` alone. Methods that take reduced states take an array with one per row. A
-    system must pickle, and should start a simulator only when a rollout needs it.
+    :meth:`propagate` alone.
+
+    *Rows.* Methods that take reduced states take an array with one per row, and answer row by row:
+    what a row gives must not depend on the others. Zero rows are asked about as well, and must be
+    answered with zero rows.
+
+    *Repeatable.* :meth:`reduce`, :meth:`propagate`, :meth:`steer`, :meth:`close`, :meth:`features`
+    and :meth:`rollout` must give the same for the same arguments, and leave these as they are. A
+    simulator must not remember what it did before; noise of the true system has to follow from the
+    state. What :meth:`sample_problem` and :meth:`sample_configurations` draw must follow from the
+    generator that they are given. Data are collected with one seed for each plan, and
+    :func:`planners.evaluate` and :func:`reliability.learn_in_rounds` have seeds of their own, so
+    that the same ``random_state`` gives each of them other problems.
+
+    *Units and frames* are the system's own, as long as all methods agree. Distances between
+    configurations are Euclidean, so that an entry in radians counts as much as one in metres: scale
+    what should count more or less. A tolerance is in the same units.
+
+    *Simulators and pickling.* A system must pickle, since data are collected in other processes
+    (``n_jobs``). Leave simulators out of ``__getstate__``, and all else in it; start or connect one
+    when a rollout first needs it, not in ``__init__``. Threads need one each.
+    ``examples/own_simulator.py`` is a template.
 
     Attributes
     ----------
@@ -84,7 +104,9 @@ class System(ABC):
     step_size : float
         The largest distance ‖q' − q‖ that one transition may cover.
     bounds : ndarray of shape (2, configuration_dim)
-        Lower limits (first row) and upper limits of the configurations that planners sample.
+        Lower limits (first row) and upper limits of the configurations that planners sample, and
+        of goals. A plan may begin out of them, where the system has come to be: what is possible
+        there is up to :meth:`propagate`.
     angular : tuple of int, default=()
         Indices of the entries of a configuration that are angles, for which -π and π are the same.
         They lie in [-π, π), and planners measure the shorter way around the circle between two
@@ -112,10 +134,12 @@ class System(ABC):
         Parameters
         ----------
         state : object
+            A start, or any state that a rollout returns.
 
         Returns
         -------
         reduced : ndarray of shape (reduced_dim,)
+            Angles, if any, in [-π, π).
         """
 
     @abstractmethod
@@ -126,13 +150,16 @@ class System(ABC):
         ----------
         reduced : ndarray of shape (n, reduced_dim)
         command : ndarray of shape (n, command_dim)
+            As :meth:`steer` returns them.
 
         Returns
         -------
         next_reduced : ndarray of shape (n, reduced_dim)
         valid : ndarray of bool of shape (n,)
             False where g has no successor (the paper's ∅); what ``next_reduced`` holds in such a
-            row does not matter.
+            row does not matter. Planners take a start, and a goal of a system whose reduced state
+            is only a configuration, where standing still is valid: the command of
+            ``steer(reduced, configuration of reduced)``.
         """
 
     @abstractmethod
@@ -140,7 +167,10 @@ class System(ABC):
         """Return, for each row, the command that moves one step towards a configuration.
 
         A step covers ``step_size``, or less if the configuration is nearer; then
-        :meth:`propagate` must arrive at it exactly.
+        :meth:`propagate` must arrive at it exactly. Only the system itself reads a command. It may
+        be an increment to go by, a target to go to, or whatever else :meth:`propagate` and
+        :meth:`rollout` understand. If commands are targets, one that is carried out from elsewhere
+        than planned still leads to its target; increments then miss by what went wrong before.
 
         Parameters
         ----------
@@ -157,12 +187,15 @@ class System(ABC):
         """Execute commands one after the other from a true state: the paper's Γ, repeated.
 
         The execution stops at the boundary of a constraint and never violates it. The same state
-        and commands must always give the same rollout.
+        and commands must always give the same rollout, in each process, and a rollout that goes on
+        from a returned state should go on as if there had been no stop: a true state holds all that
+        matters, such as velocities.
 
         Parameters
         ----------
         state : object
         commands : ndarray of shape (T, command_dim)
+            T may be 0.
 
         Returns
         -------
@@ -178,7 +211,11 @@ class System(ABC):
     def close(self, predicted: Array, executed: Array) -> NDArray[np.bool_]:
         """Say for each row whether the two reduced states are similar: the paper's Close.
 
-        A transition is labelled Reliable if what g predicts is close to what was executed.
+        A transition is labelled Reliable if what g predicts is close to what was executed. So
+        they are close if the rest of a plan would do for the one as well as for the other. That is
+        a judgement about the system, and sets how much an estimator can promise: too wide, and
+        plans of Reliable transitions fail; too narrow, and hardly a transition is Reliable. Every
+        state is close to itself.
 
         Parameters
         ----------
@@ -215,6 +252,8 @@ class System(ABC):
         Returns
         -------
         Problem
+            Planners refuse a start at which g does not even allow standing still. Of goals they
+            leave out those at which it doesn't, and refuse a problem that has no other.
         """
 
     def sample_configurations(self, rng: np.random.Generator, n: int) -> Array:
@@ -230,6 +269,7 @@ class System(ABC):
         Returns
         -------
         configurations : ndarray of shape (n, configuration_dim)
+            Within the bounds.
         """
         low, high = self.bounds
         return rng.uniform(low, high, size=(n, len(low)))
@@ -242,10 +282,12 @@ class System(ABC):
         ----------
         reduced : ndarray of shape (n, reduced_dim)
         goal : ndarray of shape (n_goals, configuration_dim)
+            Of a :class:`systems.GoalRegion`, the configurations that were drawn from it so far.
 
         Returns
         -------
         reached : ndarray of bool of shape (n,)
+            True at any one of the goals; allow for rounding.
         """
 
     @abstractmethod
@@ -256,6 +298,7 @@ class System(ABC):
         ----------
         state : object
         goal : ndarray of shape (n_goals, configuration_dim)
+            Never a :class:`systems.GoalRegion`, which is asked for its ``distance`` instead.
         tolerance : float
             In the units of the configuration; every state is within ``np.inf``.
         """

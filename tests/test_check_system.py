@@ -1,5 +1,8 @@
 """check_system says what a user's system got wrong."""
 
+import os
+import sys
+import types
 from enum import Enum
 
 import joblib
@@ -611,6 +614,27 @@ def test_simulators_of_this_process_are_told_of_pickling_and_of_connecting_late(
     )
     with pytest.raises(SystemContractError, match=expected):
         check_system(Connected())
+
+
+class Crashing(Connected):
+    """Whose simulator takes the process with it."""
+
+    def rollout(self, state, commands):
+        if self.client not in SIMULATORS:
+            os._exit(1)
+        return super().rollout(state, commands)
+
+
+def test_a_copy_that_ends_its_process_is_named():
+    with pytest.raises(SystemContractError, match="in another process does not: Terminated"):
+        check_system(Crashing())
+
+
+def test_a_class_that_no_other_process_can_import_is_checked_here(monkeypatch):
+    module = types.ModuleType("made_in_this_process")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    exec("from toy_systems import Disc\n\nclass Local(Disc): pass", vars(module))
+    check_system(module.Local())
 
 
 class Far(RightOf):
