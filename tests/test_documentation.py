@@ -29,6 +29,7 @@ PACKAGES = (systems, reliability, planners)
         "planners.planner_evaluation",
         "planners.rrt",
         "planners.rrt_connect",
+        "systems.goal_region",
     ],
 )
 def test_docstring_examples_run(module):
