@@ -46,8 +46,10 @@ def collect_transitions(
     """Plan, execute and label, many times over.
 
     Each plan has a problem and a planner seed of its own, which follow from ``random_state`` and
-    the plan's number alone. Plans that the planner doesn't solve are left out, and so are, with a
-    warning, plans on which the simulator diverges.
+    the plan's number alone: from ``SeedSequence(random_state, spawn_key=(number,))``.
+    :func:`learn_in_rounds` and :func:`planners.evaluate` have keys of three and two numbers, and so
+    other problems for the same ``random_state``. Plans that the planner doesn't solve are left
+    out, and so are, with a warning, plans on which the simulator diverges.
 
     Parameters
     ----------

@@ -88,6 +88,15 @@ def test_goals_that_will_not_do_are_left_out(planner):
         assert_same_plan(planner(Disc(), random_state=0).plan(START, goals), alone)
 
 
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_an_angle_may_start_anywhere_out_of_narrow_bounds(planner):
+    class Limited(Turntable):
+        bounds = np.array([[-0.5, -1.0], [0.5, 1.0]])
+
+    plan = planner(Limited(), random_state=0).plan([3.0, 0.0], [[0.2, 0.0]])
+    assert_sound(Limited(), plan, [3.0, 0.0], [[0.2, 0.0]])
+
+
 def test_a_nan_is_no_angle():
     with pytest.raises(ValueError, match="goal must be finite"):
         BiasedRRT(Turntable()).plan([0.0, 0.0], [[np.nan, 0.0]])
