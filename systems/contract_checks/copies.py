@@ -71,7 +71,7 @@ def _answers_of_copy(
     except Exception as error:
         raise SystemContractError(
             f"{type(system).__name__} works, but a pickled copy of it does not: "
-            f"{type(error).__name__}: {error}. {_REMEDY}"
+            f"{_told(error)}. {_REMEDY}"
         ) from error
 
 
@@ -87,9 +87,13 @@ def _answers_elsewhere(
             return None
         raise SystemContractError(
             f"{type(system).__name__} works, but a pickled copy of it in another process does "
-            f"not: {type(error).__name__}: {error}. {_REMEDY}"
+            f"not: {_told(error)}. {_REMEDY}"
         ) from error
     return answers
+
+
+def _told(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}".rstrip(".")
 
 
 def _compare(system: System, expected: dict[str, Any], answers: dict[str, Any], whose: str) -> None:
