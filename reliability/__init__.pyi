@@ -17,8 +17,9 @@ from .labels import label_executed_transitions as label_executed_transitions
 from .labels import label_transitions as label_transitions
 from .learning import LearningResult as LearningResult
 from .learning import learn_in_rounds as learn_in_rounds
-from .persistence import ModelFileError as ModelFileError
+from .model_files import ModelFileError as ModelFileError
 from .persistence import load_estimator as load_estimator
+from .persistence import save_estimator as save_estimator
 from .plan_execution import PlanFailedError as PlanFailedError
 from .reachable_code import code_digest as code_digest
 from .round_report import RoundReport as RoundReport

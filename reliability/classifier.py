@@ -15,10 +15,10 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from reliability.backends import Backend, as_backend
 from reliability.base_rate import warn_if_no_better_than_base_rate, weighted_share
+from reliability.model_files import ModelFileError
 from reliability.networks.constant_inference import ConstantInference
 from reliability.networks.hyperparameters import Hyperparameters
 from reliability.networks.voxel_format import check_packed
-from reliability.persistence import ModelFileError
 from reliability.training_set import (
     check_sample_weight,
     encode_labels,

@@ -1,22 +1,61 @@
-"""Reading estimators from files, with messages that say what is wrong with a file."""
+"""Writing estimators to files and reading them, with messages that say what is wrong."""
 
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import Any
 
 import joblib
 
+from reliability.model_checks import check_model
+from reliability.model_files import ModelFileError, read_model, write_model
 
-class ModelFileError(ValueError):
-    """A model file can't be used; the message says why and what to do."""
+SKOPS = ".skops"
+
+
+def save_estimator(estimator: Any, path: str | os.PathLike[str]) -> None:
+    """Save a fitted estimator to a file that runs no code when it is loaded.
+
+    Parameters
+    ----------
+    estimator : classifier
+        A :class:`TransitionReliabilityClassifier` of the backends "mlp" and "voxnet", or a
+        classifier of scikit-learn, Pipelines and wrappers included. Left out are support vector
+        machines, neighbours, and types of your own; save those with ``joblib.dump``.
+    path : path-like
+        Ends in ``.skops``. A file that stands there is replaced when all is written.
+
+    Raises
+    ------
+    ValueError
+        If the estimator is not fitted, or holds something that such a file may not hold, or the
+        path ends otherwise.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from sklearn.linear_model import LogisticRegression
+    >>> from reliability import load_estimator, save_estimator
+    >>> model = LogisticRegression().fit([[0.0], [1.0]], [0, 1])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_estimator(model, f"{folder}/model.skops")
+    ...     load_estimator(f"{folder}/model.skops").predict([[2.0]])
+    array([1])
+    """
+    path = Path(path)
+    if path.suffix != SKOPS:
+        raise ValueError(f"path must end in {SKOPS}, got {os.fspath(path)!r}.")
+    check_model(estimator)
+    write_model(path, estimator)
 
 
 def load_estimator(path: str | os.PathLike[str]) -> Any:
-    """Load an estimator that ``joblib.dump`` saved.
+    """Load an estimator that :func:`save_estimator` or ``joblib.dump`` saved.
 
-    Does what ``joblib.load`` does, and says what is wrong with a file that can't be loaded. Loading
-    runs code that the file names, as with any pickle: load only files that you trust.
+    A ``.skops`` file runs no code: a file that is damaged, or was made to do harm, gives an error.
+    Any other file is read with ``joblib.load``, which runs code that the file names, as with any
+    pickle: load such files only from those that you trust.
 
     Parameters
     ----------
@@ -29,28 +68,47 @@ def load_estimator(path: str | os.PathLike[str]) -> Any:
     Raises
     ------
     ModelFileError
-        If the file is truncated or no joblib file, holds no estimator, was saved in another
-        format, or needs a class that can't be imported here.
+        If the file is truncated, damaged or of another kind, holds no estimator, was saved in
+        another format, or needs a class that can't be imported here.
     FileNotFoundError
         If there is no such file.
     """
+    path = Path(path)
+    estimator = _load_skops(path) if path.suffix == SKOPS else _load_joblib(path)
+    if not hasattr(estimator, "predict"):
+        raise ModelFileError(
+            f"{path} must hold an estimator, which has the method predict, got "
+            f"{type(estimator).__name__}."
+        )
+    return estimator
+
+
+def _load_skops(path: Path) -> Any:
     try:
-        estimator = joblib.load(path)
+        estimator = read_model(path)
+        check_model(estimator)
+    except (ModelFileError, FileNotFoundError):
+        raise
+    except Exception as error:
+        raise ModelFileError(
+            f"{path} can't be used: {error or repr(error)}. Copy it again, or train and save the "
+            "model again."
+        ) from error
+    return estimator
+
+
+def _load_joblib(path: Path) -> Any:
+    try:
+        return joblib.load(path)
     except (ModelFileError, FileNotFoundError):
         raise
     except (ImportError, AttributeError) as error:
         raise ModelFileError(
-            f"{os.fspath(path)} needs something that can't be imported here ({error}); install "
-            "it, or move the class out of the script or notebook that saved the model."
+            f"{path} needs something that can't be imported here ({error}); install it, or move "
+            "the class out of the script or notebook that saved the model."
         ) from error
     except Exception as error:
         raise ModelFileError(
-            f"{os.fspath(path)} is truncated or no joblib file ({error!r}); copy it again, or "
-            "train and save the model again."
+            f"{path} is truncated or no joblib file ({error!r}); copy it again, or train and save "
+            "the model again."
         ) from error
-    if not hasattr(estimator, "predict"):
-        raise ModelFileError(
-            f"{os.fspath(path)} must hold an estimator, which has the method predict, got "
-            f"{type(estimator).__name__}."
-        )
-    return estimator

@@ -1,3 +1,4 @@
+import gc
 import pickle
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from rope_paths import PATHS, path_commands
 
+from systems import Rope
 from systems.errors import SimulationDivergedError
 from systems.rope.catenary import hanging_rope
 from systems.rope.obstacles.shapes import Box, Capsule, Cylinder
@@ -284,10 +286,64 @@ def test_bad_input_is_refused_at_the_door():
         rollout.execute(replace(state, nodes=state.nodes * np.nan), still)
     with pytest.raises(ValueError, match=r"state\.simulation must be finite"):
         rollout.execute(replace(state, simulation=state.simulation * np.nan), still)
+    into_hook = np.array([-0.16, 0.0, -0.05]) - state.grippers[0]
     with pytest.raises(ValueError, match="away from the obstacles"):
-        rollout.execute(RopeState(np.full((2, 3), -0.03), state.nodes), still)
+        rollout.execute(RopeState(state.grippers + into_hook, state.nodes + into_hook), still)
+    zigzag = state.nodes.copy()
+    zigzag[1:-1:2, 0] += 0.02
     with pytest.raises(ValueError, match=r"a rope of at most 0\.874 m"):
-        rollout.execute(RopeState(state.grippers, state.nodes * 1.3), still)
+        rollout.execute(RopeState(state.grippers, zigzag), still)
+
+
+@pytest.mark.parametrize(
+    ("record", "words"),
+    [
+        (lambda a, n: (a, n[::-1]), r"run from B to A: give state\.nodes\[::-1\]"),
+        (lambda a, n: (1000 * a, 1000 * n), "evenly spaced along a rope of 0.76 m"),
+        (lambda a, n: (a, n[::2]), r"state\.nodes must have the shape \(39, 3\), got \(20, 3\)"),
+        (lambda a, n: (a + np.array([0.0, 0.0, 0.05]), n), "a first node 0.05 m from A"),
+        (lambda a, n: (a, np.repeat(n[::2], 2, axis=0)[:-1]), "evenly spaced"),
+        (lambda a, n: (a, "rope"), r"state\.nodes must be an array of numbers"),
+    ],
+)
+def test_nodes_that_cannot_be_this_rope_are_refused(record, words):
+    rope = Rope("simple_hook")
+    start = rollout_of("simple_hook", "mujoco").settle(rope.scene.start_rope())
+    state = RopeState(*record(start.grippers, start.nodes))
+    with pytest.raises(ValueError, match=words):
+        rope.reduce(state)
+    with pytest.raises(ValueError, match=words):
+        rope.rollout(state, np.zeros((1, 6)))
+
+
+def test_a_rope_may_be_given_as_lists():
+    rope = Rope("simple_hook")
+    start = replace(
+        rollout_of("simple_hook", "mujoco").settle(rope.scene.start_rope()), simulation=None
+    )
+    lists = RopeState(start.grippers.tolist(), start.nodes.tolist())
+    move = np.full((1, 6), 0.005)
+    np.testing.assert_array_equal(rope.reduce(lists), rope.reduce(start))
+    moved, expected = rope.rollout(lists, move), rope.rollout(start, move)
+    np.testing.assert_array_equal(moved.states[-1].nodes, expected.states[-1].nodes)
+    assert rope.succeeded(lists, np.ravel(lists.grippers)[None], 1e-9)
+
+
+def test_the_users_own_pybullet_client_is_never_taken():
+    bullet = pytest.importorskip("pybullet")
+    rollout = RopeRollout(load_scene("simple_hook"), "pybullet")
+    state = rollout.settle(rollout.scene.start_rope())
+    for number in range(64):  # A user may end all clients, and have one of a number of ours.
+        if bullet.isConnected(number):
+            bullet.disconnect(number)
+    users = bullet.connect(bullet.DIRECT)
+    bullet.createMultiBody(0.0, -1, -1, physicsClientId=users)
+    rollout.execute(state, np.full((1, 6), 0.005))
+    del rollout
+    gc.collect()
+    assert bullet.isConnected(users)
+    assert bullet.getNumBodies(physicsClientId=users) == 1
+    bullet.disconnect(users)
 
 
 def test_missing_pybullet_names_the_extra(monkeypatch):

@@ -1,5 +1,8 @@
 """Γ's own rules, with a physics engine whose rope does as it is told."""
 
+import pickle
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -149,7 +152,49 @@ def test_a_command_that_is_shortened_by_a_contact_ends_the_rollout(rope):
     # The gripper's sphere of 23 mm touches the post's side at x = -0.42.
     assert executed.n_completed == 2
     np.testing.assert_allclose(executed.states[-1].grippers[:, 0], -0.443, atol=1e-6)
-    assert [len(reason.value.split()) > 5 for reason in RopeStopReason] == [True, True]
+    assert [len(reason.value.split()) > 5 for reason in RopeStopReason] == [True] * 3
+
+
+def test_the_grippers_stop_at_the_edge_of_the_world(rope):
+    rollout, _ = rope
+    start = state_of(rollout)
+    executed = rollout.execute(start, [np.tile([-0.2, 0.0, 0.0], 2)] * 5)
+    assert executed.stop_reason is RopeStopReason.EDGE_OF_WORLD
+    assert executed.n_completed == 2
+    np.testing.assert_allclose(executed.states[-1].grippers[:, 0], -1.0, atol=1e-12)
+    # From there it may go on: not farther out, but back.
+    edge = executed.states[-1]
+    stuck = rollout.execute(edge, [np.tile([-1e300, 0.0, 0.0], 2)])
+    assert stuck.stop_reason is RopeStopReason.EDGE_OF_WORLD
+    np.testing.assert_allclose(stuck.states[-1].grippers, edge.grippers, atol=1e-9)
+    back = rollout.execute(edge, [np.tile([0.2, 0.0, 0.0], 2)])
+    assert back.stop_reason is StopReason.COMPLETED
+    outside = state_of(rollout, START - np.array([0.6, 0.0, 0.0]))
+    with pytest.raises(ValueError, match=r"state\.grippers must lie within the bounds"):
+        rollout.execute(outside, [np.zeros(6)])
+
+
+def test_each_thread_has_an_engine_of_its_own(rope, monkeypatch):
+    rollout, _ = rope
+    started = []
+
+    def start_engine(*arguments):
+        started.append(ObedientRope(*arguments))
+        return started[-1]
+
+    monkeypatch.setitem(ENGINES, "mujoco", start_engine)
+    all_there = threading.Barrier(4)
+
+    def run(forward):
+        all_there.wait(timeout=60)
+        return rollout.execute(state_of(rollout), [np.tile([forward, 0.0, 0.0], 2)] * 20)
+
+    with ThreadPoolExecutor(4) as pool:
+        done = list(pool.map(run, [0.01, 0.02, 0.03, 0.04]))
+    assert len(started) == 4
+    ends = [one.states[-1].grippers[0, 0] for one in done]
+    np.testing.assert_allclose(ends, [-0.3, -0.1, 0.1, 0.3], atol=1e-9)
+    assert pickle.loads(pickle.dumps(rollout)).execute(state_of(rollout), np.empty((0, 6)))
 
 
 coordinate = st.floats(-0.3, 0.3)

@@ -131,7 +131,7 @@ def test_a_slack_rope_hangs_evenly_between_the_grippers(span, length, n_nodes):
         ({"bounds": BOUNDS[::-1]}, "lower corner and then the upper"),
         ({"rope_length": np.nan}, "rope_length must be positive"),
         ({"rope_length": -0.6}, "rope_length must be positive"),
-        ({"max_stretch": 0.9}, "max_stretch must be finite and at least 1"),
+        ({"max_stretch": 0.9}, "max_stretch must be at least 1 and at most 10"),
         ({"rope_length": 0.59}, "shorter than the distance between the grippers.*longer rope"),
         ({"rope_length": 0.5}, "stretched by 1.2, allowed 1.15.*move the grippers together"),
         ({"start": [[0.05, 0.3, 0.0], [0.0, 0.05, 0.0]]}, "start puts gripper B in collision"),

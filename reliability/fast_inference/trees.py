@@ -9,6 +9,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.ensemble._hist_gradient_boosting.common import PREDICTOR_RECORD_DTYPE
 from sklearn.utils import get_tags
 
 from reliability.fast_inference.compiled_inference import (
@@ -107,6 +108,49 @@ def compile_boosting(model: Any) -> CompiledInference | None:
     return from_decisions(score)
 
 
+def check_tree_nodes(tree: Any, n_features: int, name: str) -> None:
+    """Raise unless each node of a ``sklearn.tree`` tree leads on, to one that comes after it.
+
+    Parameters
+    ----------
+    tree : sklearn.tree._tree.Tree
+    n_features : int
+        Features that the tree is asked about.
+    name : str
+        Of the model, for the message.
+
+    Raises
+    ------
+    ValueError
+    """
+    nodes = tree.__getstate__()["nodes"]
+    _check_nodes([nodes], nodes, nodes["left_child"] == LEAF, n_features, name, _FOREST)
+
+
+def check_boosting_nodes(trees: list[NDArray[Any]], n_features: int, name: str) -> None:
+    """Raise unless each node of histogram gradient boosting leads on, to one that comes after it.
+
+    Parameters
+    ----------
+    trees : list of structured ndarray
+        The nodes of each tree.
+    n_features, name
+        As in :func:`check_tree_nodes`.
+
+    Raises
+    ------
+    ValueError
+        Also if a node is of a categorical feature.
+    """
+    if not trees or any(not len(nodes) or nodes.dtype != PREDICTOR_RECORD_DTYPE for nodes in trees):
+        raise ValueError(f"{name} is damaged: it has no trees, or they are no trees.")
+    together = np.concatenate(trees)
+    if together["is_categorical"].any():
+        raise ValueError(f"{name} splits by categorical features, which can't be checked.")
+    is_leaf = together["is_leaf"].astype(np.bool_)
+    _check_nodes(trees, together, is_leaf, n_features, name, _BOOSTING)
+
+
 def _checked(rows: NDArray[Any], dtype: Any, n_features: int, name: str) -> NDArray[Any]:
     if rows.shape[1] != n_features:
         raise ValueError(f"{name} was fitted on {n_features} features, got {rows.shape[1]}.")
@@ -146,21 +190,10 @@ def _pack(
     fields: _Fields,
 ) -> PackedTrees:
     """Join the nodes of all trees, numbered together, and the values of all leaves."""
-    sizes = np.array([len(nodes) for nodes in trees])
-    roots = np.cumsum(sizes) - sizes
-    first, size = np.repeat(roots, sizes), np.repeat(sizes, sizes)
-    children = [together[name].astype(np.int64) for name in (fields.left, fields.right)]
+    name = type(model).__name__
+    children, first = _check_nodes(trees, together, is_leaf, model.n_features_in_, name, fields)
+    roots = np.unique(first)
     feature = together[fields.feature]
-    # A child comes after its parent, so no way through a tree is endless.
-    own = np.arange(len(together)) - first
-    sound = (feature >= 0) & (feature < model.n_features_in_)
-    for child in children:
-        sound &= (child > own) & (child < size)
-    if not (sound | is_leaf).all():
-        raise ValueError(
-            f"{type(model).__name__} is damaged: a node of a tree refers to a node or a feature "
-            "that does not exist. Load the model from a sound file, or train it again."
-        )
     nodes = np.empty(len(together), dtype=NODE)
     nodes["threshold"] = together[fields.threshold]
     nodes["feature"] = np.where(is_leaf, LEAF, feature)
@@ -168,3 +201,30 @@ def _pack(
     nodes["right"] = np.where(is_leaf, LEAF, children[1] + first)
     nodes["missing_goes_left"] = together["missing_go_to_left"]
     return PackedTrees(roots, nodes, np.ascontiguousarray(values[is_leaf]))
+
+
+def _check_nodes(
+    trees: list[NDArray[Any]],
+    together: NDArray[Any],
+    is_leaf: NDArray[np.bool_],
+    n_features: int,
+    name: str,
+    fields: _Fields,
+) -> tuple[list[NDArray[np.int64]], NDArray[np.int64]]:
+    """Return each node's two children within its tree, and the number of its tree's first node."""
+    sizes = np.array([len(nodes) for nodes in trees])
+    roots = np.cumsum(sizes) - sizes
+    first, size = np.repeat(roots, sizes), np.repeat(sizes, sizes)
+    children = [together[field].astype(np.int64) for field in (fields.left, fields.right)]
+    feature = together[fields.feature]
+    # A child comes after its parent, so no way through a tree is endless.
+    own = np.arange(len(together)) - first
+    sound = (feature >= 0) & (feature < n_features)
+    for child in children:
+        sound &= (child > own) & (child < size)
+    if not (sound | is_leaf).all():
+        raise ValueError(
+            f"{name} is damaged: a node of a tree refers to a node or a feature that does not "
+            "exist. Load the model from a sound file, or train it again."
+        )
+    return children, first

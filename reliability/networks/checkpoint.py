@@ -15,7 +15,7 @@ from skorch import NeuralNet
 from skorch.callbacks import Callback
 from skorch.history import History
 
-from reliability.persistence import ModelFileError
+from reliability.model_files import ModelFileError
 
 # A file begins with this line and the digest of all that follows them.
 _FIRST_LINE = b"transition-reliability checkpoint, format 2\n"

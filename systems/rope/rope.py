@@ -17,7 +17,7 @@ from systems.rope.sampling import draw_grippers, draw_hanging_rope
 from systems.rope.scene import STEP_SIZE, Scene
 from systems.rope.simulation.engines import ENGINES
 from systems.rope.simulation.quasistatic import RopeRollout, rope_length
-from systems.rope.simulation.state import RopeState
+from systems.rope.simulation.state import RopeState, checked_rope
 from systems.rope.slack.pbd_kernels import propagate_pbd_ropes
 from systems.rope.slack.pbd_ropes import pbd_dim, pbd_model, pbd_ropes_at_rest
 from systems.system import Array, Problem, Rollout, System
@@ -102,10 +102,13 @@ class Rope(System):
 
         Raises
         ------
+        ValueError
+            If the state's nodes can't be this scene's rope, from gripper A to gripper B.
         SimulationDivergedError
             If the rope passes through an obstacle.
         """
         _check_state(state)
+        state = checked_rope(state, self.scene)
         band = reduce_rope(state.nodes, state.grippers, self.scene)
         if not self._pbd_dim:
             return band
@@ -151,8 +154,9 @@ class Rope(System):
     def rollout(self, state: RopeState, commands: ArrayLike) -> Rollout:
         """Carry out displacements in turn, quasi-statically: Γ.
 
-        It stops before a gripper, a sphere with a radius of 23 mm, would enter an obstacle, and
-        before the rope would be longer than ``scene.max_band_length``.
+        It stops before a gripper, a sphere with a radius of 23 mm, would enter an obstacle, before
+        its centre would leave the scene's bounds, and before the rope would be longer than
+        ``scene.max_band_length``.
 
         Raises
         ------
@@ -222,7 +226,8 @@ class Rope(System):
         """Say whether the grippers are within ``tolerance``, metres in R^6, of a goal: Goal_X."""
         _check_state(state)
         goals = as_finite_array(goal, "goal", (None, 6))
-        return bool((np.linalg.norm(goals - state.grippers.ravel(), axis=1) <= tolerance).any())
+        grippers = as_finite_array(state.grippers, "state.grippers", (2, 3)).ravel()
+        return bool((np.linalg.norm(goals - grippers, axis=1) <= tolerance).any())
 
     def _bands(self, rows: Array) -> Array:
         return np.ascontiguousarray(rows[:, : self._band_dim])

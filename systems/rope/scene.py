@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from systems.rope.catenary import hanging_rope
 from systems.rope.obstacles.shapes import Array, Obstacle, pack_obstacles
 from systems.rope.obstacles.signed_distance import signed_distance
-from systems.validation import as_finite_array, check_within_bounds
+from systems.validation import as_finite_array, check_within_bounds, is_number
 
 ROPE_RADIUS = 0.01
 NODE_SPACING = 0.02
@@ -23,6 +23,9 @@ GRIPPER_CLEARANCE = 0.03
 # The longest displacement of both grippers together, in R^6, in one transition.
 STEP_SIZE = 0.025
 MAX_STRETCH = 1.15
+# A reduced state has room for the longest band, so that both limits bound its size.
+LONGEST_ROPE = 100.0
+LARGEST_STRETCH = 10.0
 
 _GRIPPERS = ("A", "B")
 _TOLERANCE = 1e-9
@@ -41,12 +44,12 @@ class Scene:
     bounds : array-like of shape (2, 3)
         Lower and upper corner of the world, which the grippers do not leave.
     rope_length : float
-        Length at rest, along the rope from one gripper to the other. The lengths that the
-        paper names (0.55, 0.87, 1.13 and 1.59 m) are ``max_stretch * rope_length``.
+        Length at rest, along the rope from one gripper to the other, at most 100 m. The lengths
+        that the paper names (0.55, 0.87, 1.13 and 1.59 m) are ``max_stretch * rope_length``.
     start, goal : array-like of shape (2, 3)
         Positions of gripper A and gripper B.
     max_stretch : float
-        λ: the rope may not become longer than ``max_stretch * rope_length``.
+        λ, from 1 to 10: the rope may not become longer than ``max_stretch * rope_length``.
     name : str
 
     Raises
@@ -69,6 +72,10 @@ class Scene:
     name: str = "scene"
 
     def __post_init__(self) -> None:
+        if not isinstance(self.obstacles, Sequence):
+            raise ValueError(
+                f"obstacles must be a sequence of Box, Cylinder or Capsule, got {self.obstacles!r}."
+            )
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         for field in ("bounds", "start", "goal"):
             object.__setattr__(self, field, _frozen_array(getattr(self, field), field))
@@ -113,10 +120,16 @@ def _frozen_array(values: ArrayLike, name: str) -> Array:
 
 
 def _check_scalars(scene: Scene) -> None:
-    if not (np.ndim(scene.rope_length) == 0 and 0.0 < scene.rope_length < np.inf):
-        raise ValueError(f"rope_length must be positive and finite, got {scene.rope_length!r}.")
-    if not (np.ndim(scene.max_stretch) == 0 and 1.0 <= scene.max_stretch < np.inf):
-        raise ValueError(f"max_stretch must be finite and at least 1, got {scene.max_stretch!r}.")
+    if not is_number(scene.rope_length) or not 0.0 < scene.rope_length <= LONGEST_ROPE:
+        raise ValueError(
+            f"rope_length must be positive and at most {LONGEST_ROPE:g} m, got "
+            f"{scene.rope_length!r}."
+        )
+    if not is_number(scene.max_stretch) or not 1.0 <= scene.max_stretch <= LARGEST_STRETCH:
+        raise ValueError(
+            f"max_stretch must be at least 1 and at most {LARGEST_STRETCH:g}, got "
+            f"{scene.max_stretch!r}."
+        )
 
 
 def _check_start(scene: Scene) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.validation import as_finite_array
+from systems.validation import as_finite_array, is_integer, is_number
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]
@@ -27,6 +27,9 @@ AXIS, HALF_LENGTH = 4, 5  # of a cylinder: the world axis that it runs along
 CORE_X, CORE_Y, CORE_Z = 4, 5, 6  # of a capsule: the vector from start to end
 RADIUS = 7  # of a cylinder or a capsule
 PACKED_WIDTH = 8
+
+# Metres: with sizes beyond these, physics engines fail or lose all accuracy.
+SMALLEST_SIZE, LARGEST_SIZE = 1e-6, 1e6
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ class Cylinder:
         object.__setattr__(self, "center", _as_point(self.center, "Cylinder.center"))
         _check_positive(self.radius, "Cylinder.radius")
         _check_positive(self.half_length, "Cylinder.half_length")
-        if isinstance(self.axis, bool) or self.axis not in (0, 1, 2):
+        if not is_integer(self.axis) or self.axis not in (0, 1, 2):
             raise ValueError(f"Cylinder.axis must be 0 (x), 1 (y) or 2 (z), got {self.axis!r}.")
 
 
@@ -101,10 +104,10 @@ class Capsule:
         object.__setattr__(self, "start", _as_point(self.start, "Capsule.start"))
         object.__setattr__(self, "end", _as_point(self.end, "Capsule.end"))
         _check_positive(self.radius, "Capsule.radius")
-        if self.start == self.end:
+        if np.linalg.norm(np.subtract(self.start, self.end)) < SMALLEST_SIZE:
             raise ValueError(
-                f"Capsule.start and Capsule.end must differ, got {self.start} for both; "
-                "move one of them."
+                f"Capsule.start and Capsule.end must differ by {SMALLEST_SIZE:g} m or more, got "
+                f"{self.start} and {self.end}; move one of them."
             )
 
 
@@ -159,5 +162,8 @@ def _as_point(values: Point, name: str) -> Point:
 
 
 def _check_positive(value: float, name: str) -> None:
-    if not (np.ndim(value) == 0 and np.isfinite(value) and value > 0.0):
-        raise ValueError(f"{name} must be positive and finite, got {value!r}.")
+    if not is_number(value) or not SMALLEST_SIZE <= value <= LARGEST_SIZE:
+        raise ValueError(
+            f"{name} must be positive and finite, from {SMALLEST_SIZE:g} to {LARGEST_SIZE:g} m, "
+            f"got {value!r}."
+        )

@@ -1,4 +1,4 @@
-"""How far the grippers may move before one of them touches an obstacle."""
+"""How far the grippers may move before one touches an obstacle or leaves the world."""
 
 from __future__ import annotations
 
@@ -48,6 +48,21 @@ def share_without_contact(grippers: Array, move: Array, packed: Array) -> float:
         touches = gripper_clearance(grippers + middle * move, packed) < 0.0
         low, high = (low, middle) if touches else (middle, high)
     return float(low)
+
+
+def share_within_bounds(grippers: Array, move: Array, bounds: Array) -> float:
+    """Return the largest share of a move, at most 1, that keeps both grippers within bounds.
+
+    Parameters
+    ----------
+    grippers, move : ndarray of shape (2, 3)
+        Positions before the move, which are within bounds, and displacements, metres.
+    bounds : ndarray of shape (2, 3)
+    """
+    low, high = bounds
+    room = np.maximum(np.where(move > 0.0, high - grippers, grippers - low), 0.0)
+    leaves = np.abs(move) > room
+    return float((room[leaves] / np.abs(move[leaves])).min(initial=1.0))
 
 
 def longest_displacement(move: Array) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import uuid
 import weakref
 from collections.abc import Sequence
 from types import ModuleType
@@ -27,6 +28,8 @@ ROPE_GROUP, OBSTACLE_GROUP = 64, 2  # PyBullet puts static bodies into group 2
 # velocity, in engine lengths; and its angular velocity.
 ORIENTATION, VELOCITY, ANGULAR_VELOCITY = slice(0, 4), slice(4, 7), slice(7, 10)
 SIMULATION_WIDTH = 10
+
+_MARK = "transition-reliability"
 
 UPRIGHT = [0.0, 0.0, 0.0, 1.0]
 ORIGIN = [0.0, 0.0, 0.0]
@@ -102,7 +105,12 @@ class PybulletRope:
         bullet = self._bullet
         self._disconnect()
         self._client = bullet.connect(bullet.DIRECT)
-        self._disconnect = weakref.finalize(self, bullet.disconnect, self._client)
+        if self._client < 0:
+            raise RuntimeError(
+                "PyBullet has no free physics client: it can hold 64 at a time. Disconnect some, "
+                "or simulate in fewer threads."
+            )
+        self._disconnect = weakref.finalize(self, _disconnect, bullet, self._client, self._mark())
         bullet.setGravity(0.0, 0.0, -GRAVITY, self._client)
         bullet.setPhysicsEngineParameter(
             fixedTimeStep=TIME_STEP,
@@ -115,6 +123,17 @@ class PybulletRope:
         self._drawn = bullet.createVisualShape(
             bullet.GEOM_BOX, halfExtents=[ROPE_RADIUS] * 3, physicsClientId=self._client
         )
+
+    def _mark(self) -> tuple[int, str]:
+        """Add an empty body with a name to the client, and return its number and the name.
+
+        PyBullet numbers its clients, and uses a number again as soon as it is free. If the user
+        disconnected ours, the same number may be the user's own client by now.
+        """
+        bullet, name = self._bullet, uuid.uuid4().hex
+        body = bullet.createMultiBody(0.0, -1, -1, physicsClientId=self._client)
+        bullet.addUserData(body, _MARK, name, physicsClientId=self._client)
+        return body, name
 
     def _add_obstacle(self, obstacle: Obstacle) -> None:
         bullet, client = self._bullet, self._client
@@ -204,6 +223,16 @@ class PybulletRope:
             on_other,
             physicsClientId=self._client,
         )
+
+
+def _disconnect(bullet: ModuleType, client: int, mark: tuple[int, str]) -> None:
+    """Disconnect a client, unless its number is another client's by now."""
+    body, name = mark
+    if not bullet.isConnected(client):
+        return
+    found = bullet.getUserDataId(body, _MARK, physicsClientId=client)
+    if found >= 0 and bullet.getUserData(found, physicsClientId=client) == name.encode():
+        bullet.disconnect(client)
 
 
 def _import_pybullet() -> ModuleType:

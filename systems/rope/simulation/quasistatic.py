@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from enum import Enum
 from typing import Any
 
@@ -16,19 +17,22 @@ from systems.rope.simulation.engines import ENGINES, RopeEngine
 from systems.rope.simulation.gripper_contact import (
     gripper_clearance,
     longest_displacement,
+    share_within_bounds,
     share_without_contact,
 )
-from systems.rope.simulation.state import RopeState
+from systems.rope.simulation.state import RopeState, checked_rope
 from systems.rope.simulation.stop_reason import RopeStopReason
 from systems.rope.strides import LONGEST_STRIDE, RESTING_STEPS, STEPS_PER_STRIDE
 from systems.system import Rollout, StopReason
-from systems.validation import as_finite_array
+from systems.validation import as_finite_array, check_within_bounds
 
 # Near the largest allowed stretch the grippers' strides shorten, so that the execution ends close
 # to it. Metres.
 SHORTEST_STRIDE = 0.001
 # Metres: a rope that is shorter than the limit by at least this much is not measured.
 LENGTH_MARGIN = 0.01
+# Metres by which a gripper may be out of bounds at the edge of the world.
+ROUNDING = 1e-9
 # Time steps until a rope that is laid somewhere has come to rest.
 SETTLING_STEPS = 800
 # A rope longer than the limit by this factor shows that the simulation has diverged.
@@ -39,9 +43,10 @@ class RopeRollout:
     """Γ: moves the grippers of a rope, quasi-statically, until a constraint forbids it.
 
     An execution stops on the boundary of a constraint and never violates it: before a gripper, a
-    sphere with a radius of 23 mm, would enter an obstacle, and before the rope would be longer
-    than λ times its length at rest. The same state and commands give the same result. The physics
-    engine starts at the first execution, and is left out when a rollout is pickled.
+    sphere with a radius of 23 mm, would enter an obstacle, before its centre would leave the
+    scene's bounds, and before the rope would be longer than λ times its length at rest. The same
+    state and commands give the same result. Each thread has a physics engine of its own, which
+    starts at its first execution, and is left out when a rollout is pickled.
 
     Parameters
     ----------
@@ -62,7 +67,7 @@ class RopeRollout:
         self.engine = engine
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name != "_started"}
+        return {name: value for name, value in vars(self).items() if name != "_of_thread"}
 
     def settle(self, nodes: ArrayLike) -> RopeState:
         """Let a rope come to rest from where it is laid, its ends held by the grippers.
@@ -114,18 +119,20 @@ class RopeRollout:
             If the simulator diverged.
         """
         moves = as_finite_array(commands, "commands", (None, 6)).reshape(-1, 2, 3)
-        self._check_state(state)
+        start = self._checked_state(state)
         states = [state]
         if len(moves):
-            self._engine().load(state)
+            self._engine().load(start)
         for move in moves:
-            reached, stop_reason = self._carry_out(states[-1], move)
-            states.append(reached)
+            start, stop_reason = self._carry_out(start, move)
+            states.append(start)
             if stop_reason is not StopReason.COMPLETED:
                 return Rollout(states, len(states) - 2, stop_reason)
         return Rollout(states, len(moves), StopReason.COMPLETED)
 
     def _carry_out(self, before: RopeState, move: Array) -> tuple[RopeState, Enum]:
+        inside = share_within_bounds(before.grippers, move, self.scene.bounds)
+        move = inside * move
         share = share_without_contact(before.grippers, move, self.scene.packed)
         legal, arrived = self._move(before, share * move)
         if not arrived:
@@ -134,7 +141,9 @@ class RopeRollout:
         rested = self._engine().save()
         if self._checked_length(rested) > self.scene.max_band_length:
             return legal, RopeStopReason.OVERSTRETCHED
-        return rested, StopReason.COMPLETED if share == 1.0 else RopeStopReason.GRIPPER_CONTACT
+        if share < 1.0:
+            return rested, RopeStopReason.GRIPPER_CONTACT
+        return rested, StopReason.COMPLETED if inside == 1.0 else RopeStopReason.EDGE_OF_WORLD
 
     def _move(self, before: RopeState, move: Array) -> tuple[RopeState, bool]:
         """Return the last state that was measured and legal, and whether the grippers arrived."""
@@ -166,9 +175,8 @@ class RopeRollout:
             )
         return length
 
-    def _check_state(self, state: RopeState) -> None:
-        as_finite_array(state.grippers, "state.grippers", (2, 3))
-        as_finite_array(state.nodes, "state.nodes", (self.scene.n_nodes, 3))
+    def _checked_state(self, state: RopeState) -> RopeState:
+        state = checked_rope(state, self.scene)
         if state.simulation is not None and not np.isfinite(state.simulation).all():
             raise ValueError("state.simulation must be finite, got NaN or infinity in it.")
         if gripper_clearance(state.grippers, self.scene.packed) < 0.0:
@@ -176,18 +184,23 @@ class RopeRollout:
                 f"state must keep the grippers {GRIPPER_RADIUS} m away from the obstacles, got "
                 f"them at {state.grippers.tolist()}."
             )
+        edge = np.array([[-ROUNDING], [ROUNDING]])
+        check_within_bounds(state.grippers, self.scene.bounds + edge, "state.grippers")
         if not rope_length(state) <= self.scene.max_band_length:
             raise ValueError(
                 f"state must hold a rope of at most {self.scene.max_band_length:g} m, got "
                 f"{rope_length(state):g} m."
             )
+        return state
 
     def _engine(self) -> RopeEngine:
-        if "_started" not in vars(self):
+        of_thread = vars(self).setdefault("_of_thread", threading.local())
+        if not hasattr(of_thread, "engine"):
             scene = self.scene
             start_engine = ENGINES[self.engine]
-            self._started = start_engine(scene.obstacles, scene.n_nodes, scene.link_length)
-        return self._started
+            of_thread.engine = start_engine(scene.obstacles, scene.n_nodes, scene.link_length)
+        engine: RopeEngine = of_thread.engine
+        return engine
 
 
 def rope_length(state: RopeState) -> float:
