@@ -91,9 +91,29 @@ class Diagnosis:
         """How far predicted probabilities are from the shares observed, in the mean."""
         return self.calibration.expected_error
 
+    def accepted_unreliable(self, k: float) -> float:
+        """Return the share of Unreliable transitions that planners with this k let through.
+
+        These are the ones predicted to be Reliable, and of the others the share exp(-k p_acc) that
+        planners accept at random, with ``accuracy`` for p_acc.
+
+        Parameters
+        ----------
+        k : float
+
+        Returns
+        -------
+        share : float
+
+        References
+        ----------
+        McConachie et al. 2020, Algorithm 2.
+        """
+        return 1 - self.unreliable_recall * (1 - math.exp(-k * self.accuracy))
+
     @property
     def warnings(self) -> list[str]:
-        """Sentences that say what is wrong and what to do, most important first."""
+        """At most five sentences that say what is wrong and what to do, most important first."""
         return diagnosis_warnings(self)
 
     def to_dict(self) -> dict[str, Any]:
@@ -134,6 +154,8 @@ class Diagnosis:
             "recall of Reliable": _share(self.reliable_recall),
             "recall of Unreliable": _share(self.unreliable_recall),
             "recall of divergence onsets": _share(self.onset_recall),
+            "Unreliable that k=1 lets through": _share(self.accepted_unreliable(1)),
+            "Unreliable that k=10 lets through": _share(self.accepted_unreliable(10)),
             "expected calibration error": _share(self.expected_calibration_error),
             "Unreliable among the labels": _share(labels.unreliable_share),
             "  of these, only say: already diverged": _share(self.already_diverged_share),
@@ -193,7 +215,7 @@ def diagnose(
     estimator may be fitted or not, and is left as it is. To judge a fitted one as it is, on
     transitions of plans that it has not seen, give ``sklearn.frozen.FrozenEstimator(estimator)``.
 
-    To compare sets of features, call it with systems that differ in ``features``.
+    To compare sets of features, see :func:`compare_features`.
 
     Parameters
     ----------
@@ -231,9 +253,16 @@ def diagnose(
     >>> diagnosis.n_folds
     5
     """
-    _check_arguments(estimator, transitions, cv)
-    labels = Summary.of(transitions)
+    check_arguments(estimator, transitions, cv)
     X = transitions.features(system).reshape(len(transitions), -1)
+    return judge(estimator, transitions, X, cv, n_jobs)[0]
+
+
+def judge(
+    estimator: Any, transitions: Transitions, X: NDArray[Any], cv: int, n_jobs: int | None
+) -> tuple[Diagnosis, UnseenPredictions | None]:
+    """Diagnose with features X, (n, n_features); also return the predictions, if there are any."""
+    labels = Summary.of(transitions)
     n_folds = None
     predictions = None
     if labels.base_rate < 1 and (labels.n_plans > 1 or isinstance(estimator, FrozenEstimator)):
@@ -243,7 +272,7 @@ def diagnose(
     is_network = isinstance(estimator, TransitionReliabilityClassifier)
     ranges = np.column_stack([X.min(axis=0), X.max(axis=0)]).astype(float)
     constant = constant_columns(X, ranges)
-    return Diagnosis(
+    diagnosis = Diagnosis(
         labels=labels,
         n_folds=n_folds,
         **_scores(transitions, predictions),
@@ -252,9 +281,11 @@ def diagnose(
         duplicate_features=duplicate_columns(X, constant),
         unscaled_features=unscaled_columns(X, ranges) if is_network else (),
     )
+    return diagnosis, predictions
 
 
-def _check_arguments(estimator: Any, transitions: Any, cv: Any) -> None:
+def check_arguments(estimator: Any, transitions: Any, cv: Any) -> None:
+    """Raise ``ValueError`` unless these can be judged."""
     if not isinstance(transitions, Transitions) or not len(transitions):
         raise ValueError(
             "transitions must be Transitions, at least one, as collect_transitions returns them; "

@@ -25,6 +25,11 @@ PACKAGES = (systems, reliability, planners)
     [
         "reliability.classifier",
         "reliability.diagnosis",
+        "reliability.feature_comparison",
+        "systems.features.body_frame",
+        "systems.features.directions",
+        "systems.features.mujoco_obstacles",
+        "systems.features.ray_distances",
         "planners.execution",
         "planners.planner_evaluation",
         "planners.rrt",
@@ -123,6 +128,9 @@ def test_every_public_name_documents_what_it_takes(thing):
         (
             "mujoco",
             {
+                "systems/features/holding_load.py",
+                "systems/features/mujoco_models.py",
+                "systems/features/mujoco_obstacles.py",
                 "systems/planar_arm/simulation.py",
                 "systems/rope/renderer.py",
                 "systems/rope/simulation/mujoco_engine.py",
