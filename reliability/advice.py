@@ -182,8 +182,9 @@ def _which_k(diagnosis: Any) -> str:
 def _better_features() -> str:
     return (
         "let system.features describe what the reduced model ignores (distances to obstacles, "
-        "forces, the motion in the robot's frame) and system.reduce keep what it depends on (such "
-        "as speeds), collect more plans, or try another estimator (boosted trees or a network)"
+        "forces, the motion in the robot's frame: docs/features.md) and system.reduce keep what it "
+        "depends on (such as speeds), collect more plans, or try another estimator (boosted trees "
+        "or a network)"
     )
 
 

@@ -77,7 +77,9 @@ def test_the_readmes_rope_scene_can_be_learned(tmp_path, monkeypatch, capsys):
     assert "The plan reaches the goal." in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md", "examples/README.md"])
+@pytest.mark.parametrize(
+    "document", ["README.md", "CONTRIBUTING.md", "docs/features.md", "examples/README.md"]
+)
 def test_what_documents_mention_exists(document):
     text = (ROOT / document).read_text()
     for name in set(re.findall(r"(?<![\w./])(?:systems|reliability|planners)(?:\.\w+)+", text)):

@@ -41,13 +41,14 @@ def holding_load(model_file: str | os.PathLike[str], positions: ArrayLike) -> Ar
     """
     import mujoco
 
-    model, data, _, _ = thread_model(model_file)
+    file = os.path.abspath(model_file)
+    model, data = thread_model(file)[:2]
     rows = as_finite_array(positions, "positions", (None, model.nq))
-    limited, low, high = _limits(os.fspath(model_file))
+    limited, low, high = _limits(file)
     if not len(limited):
         raise ValueError(
             f"model_file must limit the force of a joint (actuatorfrcrange) or of an actuator "
-            f"that acts on one (forcerange); {os.fspath(model_file)} limits none."
+            f"that acts on one (forcerange); {file} limits none."
         )
     needed = np.empty((len(rows), model.nv))
     for i, row in enumerate(rows):

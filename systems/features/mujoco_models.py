@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import threading
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 PROBE_RADIUS = 1e-3
 OBSTACLE_GROUP = 0
@@ -24,22 +24,29 @@ class ModelMemory(NamedTuple):
     data : mujoco.MjData
     probe : int
         The geom of a small sphere, of ``PROBE_RADIUS`` metres.
-    obstacles : tuple of int
+    obstacles : list of int
         The geoms that are fixed to the world, without those to ignore.
+    centres : ndarray of shape (n_obstacles, 3)
+        Centres of spheres around the obstacles.
+    radii : ndarray of shape (n_obstacles,)
+        Their radii; infinite for planes.
     """
 
     model: Any
     data: Any
     probe: int
-    obstacles: tuple[int, ...]
+    obstacles: list[int]
+    centres: NDArray[np.float64]
+    radii: NDArray[np.float64]
 
 
-def thread_model(file: str | os.PathLike[str], ignore: tuple[str, ...] = ()) -> ModelMemory:
+def thread_model(file: str, ignore: tuple[str, ...] = ()) -> ModelMemory:
     """Return the model of a file, read when this thread first asks for it.
 
     Parameters
     ----------
-    file : str or path
+    file : str
+        An absolute path.
     ignore : tuple of str, default=()
         Names of geoms that are no obstacles.
 
@@ -49,9 +56,9 @@ def thread_model(file: str | os.PathLike[str], ignore: tuple[str, ...] = ()) -> 
         If MuJoCo can't read the file, or knows no geom of an ignored name.
     """
     known = _of_thread.__dict__.setdefault("models", {})
-    key = os.path.abspath(file), ignore
+    key = file, ignore
     if key not in known:
-        known[key] = _read(*key)
+        known[key] = _read(file, ignore)
     return known[key]
 
 
@@ -74,10 +81,13 @@ def _read(path: str, ignore: tuple[str, ...]) -> ModelMemory:
     _show_to_rays(model, obstacles)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    return ModelMemory(model, data, model.geom(_PROBE).id, obstacles)
+    planes = model.geom_type[obstacles] == mujoco.mjtGeom.mjGEOM_PLANE
+    radii = np.where(planes, np.inf, model.geom_rbound[obstacles])
+    centres = data.geom_xpos[obstacles]
+    return ModelMemory(model, data, model.geom(_PROBE).id, obstacles, centres, radii)
 
 
-def _obstacles(model: Any, ignore: tuple[str, ...]) -> tuple[int, ...]:
+def _obstacles(model: Any, ignore: tuple[str, ...]) -> list[int]:
     names = [model.geom(i).name for i in range(model.ngeom)]
     unknown = set(ignore) - set(names)
     if unknown:
@@ -86,12 +96,12 @@ def _obstacles(model: Any, ignore: tuple[str, ...]) -> tuple[int, ...]:
             f"ignore must name geoms of the model, which are {known}, got {sorted(unknown)}."
         )
     fixed = np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0)
-    return tuple(int(i) for i in fixed if names[i] not in (*ignore, _PROBE))
+    return [int(i) for i in fixed if names[i] not in (*ignore, _PROBE)]
 
 
-def _show_to_rays(model: Any, obstacles: tuple[int, ...]) -> None:
+def _show_to_rays(model: Any, obstacles: list[int]) -> None:
     """Let rays find all obstacles, which they only do if these are visible."""
     model.geom_group[:] = OBSTACLE_GROUP + 1
-    model.geom_group[list(obstacles)] = OBSTACLE_GROUP
+    model.geom_group[obstacles] = OBSTACLE_GROUP
     model.geom_rgba[:, 3] = 1
     model.geom_matid[:] = -1

@@ -55,7 +55,7 @@ class MujocoObstacles:
         ignore: Sequence[str] = (),
         height: float | None = None,
     ) -> None:
-        self.model_file = model_file
+        self.model_file = os.path.abspath(model_file)
         self.ignore = tuple(ignore)
         self.height = height
 
@@ -96,11 +96,11 @@ class MujocoObstacles:
         from mujoco import mj_ray
 
         starts, ways = self._in_space(origins), _widened(rays, 0.0)
-        model, data, _, _ = thread_model(self.model_file, self.ignore)
+        memory = thread_model(self.model_file, self.ignore)
         shown = np.arange(N_GROUPS, dtype=np.uint8) == OBSTACLE_GROUP
         hit = np.zeros((1, 1), dtype=np.int32)
         lengths = [
-            mj_ray(model, data, start, way, shown.astype(np.uint8), True, -1, hit)
+            mj_ray(memory.model, memory.data, start, way, shown.astype(np.uint8), True, -1, hit)
             for start, way in zip(starts.reshape(-1, 3), ways.reshape(-1, 3), strict=True)
         ]
         found = np.reshape(lengths, starts.shape[:-1]).astype(np.float64)
@@ -127,25 +127,18 @@ def _widened(points: Array, z: float) -> Array:
 
 def _distances(memory: ModelMemory, points: Array) -> Array:
     """Return the signed distance of points, (n, 3), from the nearest of at least one obstacle."""
-    from mujoco import mj_geomDistance, mjtGeom
+    from mujoco import mj_geomDistance
 
-    model, data, probe, obstacles = memory
-    geoms = list(obstacles)
-    # No obstacle is nearer than the sphere around it. Planes have none.
-    around = np.where(
-        model.geom_type[geoms] == mjtGeom.mjGEOM_PLANE, np.inf, model.geom_rbound[geoms]
-    )
-    least = np.linalg.norm(points[:, None] - data.geom_xpos[geoms], axis=2) - around
-    order = np.argsort(least, axis=1)
-    least = np.take_along_axis(least, order, axis=1) - PROBE_RADIUS
+    model, data, probe, obstacles, centres, radii = memory
+    # No obstacle is nearer than the sphere around it: most need not be measured.
+    least = np.linalg.norm(points[:, None] - centres, axis=2) - radii - PROBE_RADIUS
     position = data.geom_xpos[probe]
     distances = np.empty(len(points))
-    for i, (bounds, nearest_first) in enumerate(zip(least.tolist(), order.tolist(), strict=True)):
+    for i, (first, bounds) in enumerate(zip(least.argmin(axis=1), least.tolist(), strict=True)):
         position[:] = points[i]
-        nearest = np.inf
-        for bound, j in zip(bounds, nearest_first, strict=True):
-            if bound >= nearest:
-                break
-            nearest = min(nearest, mj_geomDistance(model, data, probe, geoms[j], FAR, None))
-        distances[i] = nearest + PROBE_RADIUS
-    return distances
+        nearest = mj_geomDistance(model, data, probe, obstacles[first], FAR, None)
+        for obstacle, bound in zip(obstacles, bounds, strict=True):
+            if bound < nearest:
+                nearest = min(nearest, mj_geomDistance(model, data, probe, obstacle, FAR, None))
+        distances[i] = nearest
+    return distances + PROBE_RADIUS
