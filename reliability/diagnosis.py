@@ -15,6 +15,7 @@ from reliability.base_rate import beats_base_rate
 from reliability.calibration_curve import CalibrationCurve
 from reliability.classifier import TransitionReliabilityClassifier
 from reliability.diagnosis_plot import draw_diagnosis
+from reliability.diagnosis_table import diagnosis_table
 from reliability.feature_columns import constant_columns, duplicate_columns, unscaled_columns
 from reliability.labels import RELIABLE
 from reliability.scenes import SceneArgument
@@ -146,43 +147,9 @@ class Diagnosis:
 
     def __str__(self) -> str:
         """Return a table of the numbers, and the warnings below."""
-        labels = self.labels
-        rows = {
-            "base rate (one label for every transition)": _share(self.base_rate),
-            "accuracy": _share(self.accuracy),
-            "balanced accuracy (chance is 0.5)": _share(self.balanced_accuracy),
-            "recall of Reliable": _share(self.reliable_recall),
-            "recall of Unreliable": _share(self.unreliable_recall),
-            "recall of divergence onsets": _share(self.onset_recall),
-            "Unreliable that k=1 lets through": _share(self.accepted_unreliable(1)),
-            "Unreliable that k=10 lets through": _share(self.accepted_unreliable(10)),
-            "expected calibration error": _share(self.expected_calibration_error),
-            "Unreliable among the labels": _share(labels.unreliable_share),
-            "  of these, only say: already diverged": _share(self.already_diverged_share),
-            "labels from executed states": _share(labels.executed_share),
-            "features": str(len(self.feature_ranges)),
-            "  constant": str(len(self.constant_features)),
-            "  equal to another": str(len(self.duplicate_features)),
-        }
-        table = "\n".join(f"{name:<44}{value:>8}" for name, value in rows.items())
-        warnings = [f"{i}. {sentence}" for i, sentence in enumerate(self.warnings, 1)]
-        return "\n".join(
-            [
-                f"{labels.n_transitions:,} transitions of {labels.n_plans:,} plans, {self._how()}",
-                table,
-                "Warnings, most important first:" if warnings else "No warnings.",
-                *warnings,
-            ]
-        )
+        return diagnosis_table(self)
 
     __repr__ = __str__
-
-    def _how(self) -> str:
-        if self.n_folds is None:
-            return "too few or too much alike to judge predictions"
-        if self.n_folds == 0:
-            return "judged by the estimator as it is"
-        return f"each judged by a clone that has not seen its plan ({self.n_folds} folds)"
 
     def plot(self, axes: Any = None) -> Any:
         """Draw calibration, recalls beside the base rate, and ranges of features.
@@ -322,7 +289,3 @@ def _scores(transitions: Transitions, predictions: UnseenPredictions | None) -> 
         "onset_recall": float(right[transitions.divergence_onsets()].mean()),
         "calibration": CalibrationCurve.of(reliable[told], predictions.probability[told]),
     }
-
-
-def _share(value: float) -> str:
-    return "unknown" if math.isnan(value) else f"{value:.3f}"

@@ -56,7 +56,7 @@ SLIDES = """
   </worldbody>
   <actuator>
     <motor joint="limited twice" forcerange="-10 10" gear="4"/>
-    <motor joint="two motors" forcerange="-10 10" gear="-2"/>
+    <motor joint="two motors" forcerange="-10 5" gear="-2"/>
     <motor joint="two motors" forcerange="-1 30"/>
     <motor joint="free"/>
   </actuator>
