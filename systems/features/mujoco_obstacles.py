@@ -70,7 +70,7 @@ class MujocoObstacles:
         Returns
         -------
         distances : ndarray of shape (...)
-            In metres, negative inside an obstacle (MuJoCo before 3.3 may say 0 there); infinite
+            In metres, negative inside an obstacle (MuJoCo before 3.2.7 may say 0 there); infinite
             where there are no obstacles.
         """
         places = self._in_space(points)
@@ -97,10 +97,10 @@ class MujocoObstacles:
 
         starts, ways = self._in_space(origins), _widened(rays, 0.0)
         memory = thread_model(self.model_file, self.ignore)
-        shown = np.arange(N_GROUPS, dtype=np.uint8) == OBSTACLE_GROUP
+        shown = (np.arange(N_GROUPS) == OBSTACLE_GROUP).astype(np.uint8)
         hit = np.zeros((1, 1), dtype=np.int32)
         lengths = [
-            mj_ray(memory.model, memory.data, start, way, shown.astype(np.uint8), True, -1, hit)
+            mj_ray(memory.model, memory.data, start, way, shown, True, -1, hit)
             for start, way in zip(starts.reshape(-1, 3), ways.reshape(-1, 3), strict=True)
         ]
         found = np.reshape(lengths, starts.shape[:-1]).astype(np.float64)

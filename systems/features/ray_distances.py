@@ -33,10 +33,10 @@ def ray_distances(
         obstacles, of the unit that the points have. It may tell less than the true distance, never
         more.
     origins : array-like of shape (..., d)
-        Where the rays start, such as the first result of
-        ``from_body_frame(poses, places)``.
+        Where the rays start, such as ``poses[:, None, :2]``.
     rays : array-like of shape (..., d)
-        Directions, of any length but zero; broadcast with ``origins``. World frame.
+        Directions, of any length but zero; broadcast with ``origins``. World frame: directions
+        that are fixed to a body are ``from_body_frame(poses, ways) - poses[:, None, :2]``.
     reach : float
         Rays end here, at the latest.
 
