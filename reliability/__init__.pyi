@@ -7,6 +7,8 @@ from .collect import collect_transitions as collect_transitions
 from .diagnosis import Diagnosis as Diagnosis
 from .diagnosis import diagnose as diagnose
 from .fast_inference.compiling import compile_inference as compile_inference
+from .feature_comparison import FeatureComparison as FeatureComparison
+from .feature_comparison import compare_features as compare_features
 from .identity import describe as describe
 from .item_files import Item as Item
 from .item_files import StoreError as StoreError

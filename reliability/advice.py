@@ -10,10 +10,14 @@ from reliability.base_rate import WEAK_BALANCED_ACCURACY
 # Figures of so few plans change with every plan.
 FEW_PLANS = 20
 POOR_RECALL = 0.5
+# With a lower recall of Reliable, planners that reject nearly all Unreliable transitions lose many
+# good ones.
+COSTLY_RECALL = 0.7
 POOR_CALIBRATION = 0.1
 # More labels of no content than this, and the others are too few to learn from.
 _MOSTLY_DIVERGED = 2 / 3
 _MOST_LISTED = 8
+_MOST_WARNINGS = 5
 
 
 def label_warnings(labels: Any) -> list[str]:
@@ -29,7 +33,7 @@ def label_warnings(labels: Any) -> list[str]:
 
 
 def diagnosis_warnings(diagnosis: Any) -> list[str]:
-    """Say what is wrong, most important first: labels, then predictions, then features."""
+    """Say what is wrong, most important first: labels, predictions, k, then features."""
     labels = diagnosis.labels
     warnings = []
     if len(diagnosis.constant_features) == len(diagnosis.feature_ranges):
@@ -43,23 +47,19 @@ def diagnosis_warnings(diagnosis: Any) -> list[str]:
         warnings.append(_few_plans(labels))
     if diagnosis.n_folds is not None and labels.base_rate < 1:
         warnings += _about_predictions(diagnosis)
-    return [*warnings, *_about_features(diagnosis)]
+    return [*warnings, *_about_features(diagnosis)][:_MOST_WARNINGS]
 
 
 def _about_predictions(diagnosis: Any) -> Iterable[str]:
     weak = diagnosis.balanced_accuracy < WEAK_BALANCED_ACCURACY
     if weak and not diagnosis.beats_base_rate:
         yield _at_base_rate(diagnosis)
-    elif diagnosis.onset_recall < POOR_RECALL:
-        yield _onsets_missed(diagnosis)
-    elif diagnosis.reliable_recall < POOR_RECALL:
-        yield (
-            f"Only {diagnosis.reliable_recall:.0%} of the Reliable transitions are recognized, so "
-            "that planners may find no way: weigh both labels alike (class_weight='balanced', "
-            "where the estimator has it), or collect more plans."
-        )
-    elif weak:
-        yield _weak(diagnosis)
+    else:
+        if diagnosis.onset_recall < POOR_RECALL:
+            yield _onsets_missed(diagnosis)
+        elif weak and diagnosis.reliable_recall >= POOR_RECALL:
+            yield _weak(diagnosis)
+        yield _which_k(diagnosis)
     if diagnosis.expected_calibration_error > POOR_CALIBRATION:
         yield (
             f"Probabilities are off by {diagnosis.expected_calibration_error:.2f} on average, so "
@@ -158,11 +158,33 @@ def _onsets_missed(diagnosis: Any) -> str:
     return f"{recall} are recognized, and plans go through the others: {_better_features()}."
 
 
+def _which_k(diagnosis: Any) -> str:
+    """Weigh what k lets through against what it costs."""
+    kept = diagnosis.reliable_recall
+    through = (
+        f"k=1 lets {diagnosis.accepted_unreliable(1):.0%} of Unreliable transitions through and "
+        f"k=10 {diagnosis.accepted_unreliable(10):.0%}: use k=10"
+    )
+    if kept >= COSTLY_RECALL:
+        return f"{through}, which costs {1 - kept:.0%} of the Reliable ones."
+    remedy = (
+        "weigh both labels alike (class_weight='balanced', where the estimator has it), or collect "
+        "more plans"
+        if diagnosis.labels.executed_share
+        else "collect with labels='executed'"
+    )
+    return (
+        f"{through}; with a recall of Reliable of {kept:.2f} many transitions are lost, so that "
+        f"planners may find no way: {remedy} first."
+    )
+
+
 def _better_features() -> str:
     return (
         "let system.features describe what the reduced model ignores (distances to obstacles, "
-        "forces, the motion in the robot's frame) and system.reduce keep what it depends on (such "
-        "as speeds), collect more plans, or try another estimator (boosted trees or a network)"
+        "forces, the motion in the robot's frame: docs/features.md) and system.reduce keep what it "
+        "depends on (such as speeds), collect more plans, or try another estimator (boosted trees "
+        "or a network)"
     )
 
 

@@ -15,6 +15,7 @@ from reliability.base_rate import beats_base_rate
 from reliability.calibration_curve import CalibrationCurve
 from reliability.classifier import TransitionReliabilityClassifier
 from reliability.diagnosis_plot import draw_diagnosis
+from reliability.diagnosis_table import diagnosis_table
 from reliability.feature_columns import constant_columns, duplicate_columns, unscaled_columns
 from reliability.labels import RELIABLE
 from reliability.scenes import SceneArgument
@@ -91,9 +92,29 @@ class Diagnosis:
         """How far predicted probabilities are from the shares observed, in the mean."""
         return self.calibration.expected_error
 
+    def accepted_unreliable(self, k: float) -> float:
+        """Return the share of Unreliable transitions that planners with this k let through.
+
+        These are the ones predicted to be Reliable, and of the others the share exp(-k p_acc) that
+        planners accept at random, with ``accuracy`` for p_acc.
+
+        Parameters
+        ----------
+        k : float
+
+        Returns
+        -------
+        share : float
+
+        References
+        ----------
+        McConachie et al. 2020, Algorithm 2.
+        """
+        return 1 - self.unreliable_recall * (1 - math.exp(-k * self.accuracy))
+
     @property
     def warnings(self) -> list[str]:
-        """Sentences that say what is wrong and what to do, most important first."""
+        """At most five sentences that say what is wrong and what to do, most important first."""
         return diagnosis_warnings(self)
 
     def to_dict(self) -> dict[str, Any]:
@@ -126,41 +147,9 @@ class Diagnosis:
 
     def __str__(self) -> str:
         """Return a table of the numbers, and the warnings below."""
-        labels = self.labels
-        rows = {
-            "base rate (one label for every transition)": _share(self.base_rate),
-            "accuracy": _share(self.accuracy),
-            "balanced accuracy (chance is 0.5)": _share(self.balanced_accuracy),
-            "recall of Reliable": _share(self.reliable_recall),
-            "recall of Unreliable": _share(self.unreliable_recall),
-            "recall of divergence onsets": _share(self.onset_recall),
-            "expected calibration error": _share(self.expected_calibration_error),
-            "Unreliable among the labels": _share(labels.unreliable_share),
-            "  of these, only say: already diverged": _share(self.already_diverged_share),
-            "labels from executed states": _share(labels.executed_share),
-            "features": str(len(self.feature_ranges)),
-            "  constant": str(len(self.constant_features)),
-            "  equal to another": str(len(self.duplicate_features)),
-        }
-        table = "\n".join(f"{name:<44}{value:>8}" for name, value in rows.items())
-        warnings = [f"{i}. {sentence}" for i, sentence in enumerate(self.warnings, 1)]
-        return "\n".join(
-            [
-                f"{labels.n_transitions:,} transitions of {labels.n_plans:,} plans, {self._how()}",
-                table,
-                "Warnings, most important first:" if warnings else "No warnings.",
-                *warnings,
-            ]
-        )
+        return diagnosis_table(self)
 
     __repr__ = __str__
-
-    def _how(self) -> str:
-        if self.n_folds is None:
-            return "too few or too much alike to judge predictions"
-        if self.n_folds == 0:
-            return "judged by the estimator as it is"
-        return f"each judged by a clone that has not seen its plan ({self.n_folds} folds)"
 
     def plot(self, axes: Any = None) -> Any:
         """Draw calibration, recalls beside the base rate, and ranges of features.
@@ -193,7 +182,7 @@ def diagnose(
     estimator may be fitted or not, and is left as it is. To judge a fitted one as it is, on
     transitions of plans that it has not seen, give ``sklearn.frozen.FrozenEstimator(estimator)``.
 
-    To compare sets of features, call it with systems that differ in ``features``.
+    To compare sets of features, see :func:`compare_features`.
 
     Parameters
     ----------
@@ -231,9 +220,16 @@ def diagnose(
     >>> diagnosis.n_folds
     5
     """
-    _check_arguments(estimator, transitions, cv)
-    labels = Summary.of(transitions)
+    check_arguments(estimator, transitions, cv)
     X = transitions.features(system).reshape(len(transitions), -1)
+    return judge(estimator, transitions, X, cv, n_jobs)[0]
+
+
+def judge(
+    estimator: Any, transitions: Transitions, X: NDArray[Any], cv: int, n_jobs: int | None
+) -> tuple[Diagnosis, UnseenPredictions | None]:
+    """Diagnose with features X, (n, n_features); also return the predictions, if there are any."""
+    labels = Summary.of(transitions)
     n_folds = None
     predictions = None
     if labels.base_rate < 1 and (labels.n_plans > 1 or isinstance(estimator, FrozenEstimator)):
@@ -243,7 +239,7 @@ def diagnose(
     is_network = isinstance(estimator, TransitionReliabilityClassifier)
     ranges = np.column_stack([X.min(axis=0), X.max(axis=0)]).astype(float)
     constant = constant_columns(X, ranges)
-    return Diagnosis(
+    diagnosis = Diagnosis(
         labels=labels,
         n_folds=n_folds,
         **_scores(transitions, predictions),
@@ -252,9 +248,11 @@ def diagnose(
         duplicate_features=duplicate_columns(X, constant),
         unscaled_features=unscaled_columns(X, ranges) if is_network else (),
     )
+    return diagnosis, predictions
 
 
-def _check_arguments(estimator: Any, transitions: Any, cv: Any) -> None:
+def check_arguments(estimator: Any, transitions: Any, cv: Any) -> None:
+    """Raise ``ValueError`` unless these can be judged."""
     if not isinstance(transitions, Transitions) or not len(transitions):
         raise ValueError(
             "transitions must be Transitions, at least one, as collect_transitions returns them; "
@@ -291,7 +289,3 @@ def _scores(transitions: Transitions, predictions: UnseenPredictions | None) -> 
         "onset_recall": float(right[transitions.divergence_onsets()].mean()),
         "calibration": CalibrationCurve.of(reliable[told], predictions.probability[told]),
     }
-
-
-def _share(value: float) -> str:
-    return "unknown" if math.isnan(value) else f"{value:.3f}"

@@ -8,6 +8,13 @@ from .car.scenes import random_car_scene as random_car_scene
 from .contract_checks.check_system import check_system as check_system
 from .errors import SimulationDivergedError as SimulationDivergedError
 from .errors import SystemContractError as SystemContractError
+from .features.body_frame import from_body_frame as from_body_frame
+from .features.body_frame import motion_in_body_frame as motion_in_body_frame
+from .features.body_frame import to_body_frame as to_body_frame
+from .features.directions import directions as directions
+from .features.holding_load import holding_load as holding_load
+from .features.mujoco_obstacles import MujocoObstacles as MujocoObstacles
+from .features.ray_distances import ray_distances as ray_distances
 from .goal_region import GoalRegion as GoalRegion
 from .planar_arm.planar_arm import PlanarArm as PlanarArm
 from .rope.obstacles.shapes import Box as Box

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from systems.features.default import default_features
 from systems.goal_region import GoalRegion
 from systems.validation import RandomState
 
@@ -226,9 +227,14 @@ class System(ABC):
         close : ndarray of bool of shape (n,)
         """
 
-    @abstractmethod
     def features(self, reduced: Array, next_reduced: Array) -> NDArray[Any]:
         """Return what an estimator sees of transitions in this scene.
+
+        By default, where a transition starts and how it moves: the configuration, from -1 to 1
+        within ``bounds``, angles as sine and cosine instead; the rest of the reduced state as it
+        is; and the change of the configuration (angles the shorter way round) and of the rest,
+        over ``step_size``. Override this to say what the reduced model ignores, such as how
+        near obstacles are; docs/features.md shows how.
 
         Parameters
         ----------
@@ -239,6 +245,9 @@ class System(ABC):
         X : ndarray of shape (n, n_features)
             Whatever matters of the scene has to be in these numbers.
         """
+        return default_features(
+            reduced, next_reduced, self.bounds, self.angular, float(self.step_size)
+        )
 
     @abstractmethod
     def sample_problem(self, random_state: RandomState = None) -> Problem:

@@ -62,6 +62,11 @@ def has_warning(diagnosis, words):
     return any(re.search(words, sentence) for sentence in diagnosis.warnings)
 
 
+def faults(diagnosis):
+    """Return the warnings without the one that says which k, which comes wherever k matters."""
+    return [sentence for sentence in diagnosis.warnings if not sentence.startswith("k=1 lets")]
+
+
 # Numbers, against plain references
 
 
@@ -193,7 +198,7 @@ def test_without_probabilities_calibration_is_unknown(rng):
     assert diagnosis.accuracy > 0.9
     assert diagnosis.to_dict()["expected_calibration_error"] is None
     assert re.search(r"calibration error +unknown", str(diagnosis))
-    assert diagnosis.warnings == []
+    assert faults(diagnosis) == []
 
 
 def test_voxel_grids_are_judged_and_not_blamed_for_empty_space(rng):
@@ -239,13 +244,13 @@ def joined_warning(data):
     return diagnose(DummyClassifier(), data, Table(4)).warnings[0]
 
 
-def test_where_all_is_well_nothing_is_said(rng):
+def test_where_all_is_well_only_k_is_advised(rng):
     for estimator in (LogisticRegression(), make_pipeline(StandardScaler(), quick_network())):
         diagnosis = diagnose(estimator, executed_steps(rng, n_plans=300), Table(3))
         assert diagnosis.beats_base_rate
         assert diagnosis.accuracy > 0.9
-        assert diagnosis.warnings == []
-        assert "No warnings." in str(diagnosis)
+        (only,) = diagnosis.warnings
+        assert only.startswith("k=1 lets")
 
 
 def test_features_of_noise_are_blamed_where_labels_are_sound(rng):
@@ -284,7 +289,7 @@ def test_knowing_only_what_follows_a_divergence_is_noticed(rng):
         LogisticRegression(), table(np.column_stack([known, data.reduced[:, 1]]), plans), Table()
     )
     assert well.onset_recall == 1.0
-    assert well.warnings == [], "labels of Eq. 3 that are understood are no fault"
+    assert faults(well) == [], "labels of Eq. 3 that are understood are no fault"
 
 
 @pytest.mark.parametrize("after_is_known", [False, True])
@@ -300,7 +305,7 @@ def test_labels_are_blamed_where_what_follows_a_divergence_looks_reliable(after_
     diagnosis = diagnose(scripted(), data, Table())
     assert diagnosis.balanced_accuracy < 0.7
     assert diagnosis.onset_recall >= 0.5
-    (warning,) = diagnosis.warnings
+    (warning,) = faults(diagnosis)
     assert warning.startswith("The balanced accuracy is 0.")
     assert ("collect with labels='executed'" in warning) == (not after_is_known)
     assert ("let system.features" in warning) == after_is_known
@@ -322,7 +327,6 @@ def answers_with_recalls(rng, of_unreliable, of_reliable, unreliable_share=0.5, 
     ("recalls", "words"),
     [
         ((0.45, 0.99), "Only 45% of the transitions at which executions diverge.*plans go through"),
-        ((0.99, 0.45), "Only 45% of the Reliable transitions are recognized"),
         ((0.65, 0.65), "The balanced accuracy is 0.65, and 0.5 is chance"),
         ((0.9, 0.9), None),
         ((0.55, 0.95), None),
@@ -334,14 +338,49 @@ def test_the_label_that_is_not_recognized_is_named(rng, recalls, words):
     assert [diagnosis.unreliable_recall, diagnosis.reliable_recall] == pytest.approx(
         recalls, abs=0.01
     )
-    assert len(diagnosis.warnings) == (words is not None)
+    assert len(faults(diagnosis)) == (words is not None)
     assert words is None or re.search(words, diagnosis.warnings[0])
+
+
+@pytest.mark.parametrize("executed", [True, False])
+@pytest.mark.parametrize(
+    ("recalls", "costs"),
+    [((0.9, 0.95), None), ((0.9, 0.71), None), ((0.9, 0.69), "0.69"), ((0.99, 0.45), "0.45")],
+)
+def test_the_advice_on_k_weighs_what_it_lets_through_against_what_it_costs(
+    rng, recalls, costs, executed
+):
+    data = answers_with_recalls(rng, *recalls)
+    data.executed[:] = executed
+    diagnosis = diagnose(scripted(), data, Table())
+    (advice,) = diagnosis.warnings
+    missed = 1 - diagnosis.unreliable_recall
+    at_random = diagnosis.unreliable_recall * np.exp(-diagnosis.accuracy)
+    assert diagnosis.accepted_unreliable(1) == pytest.approx(missed + at_random)
+    assert diagnosis.accepted_unreliable(np.inf) == pytest.approx(missed)
+    assert advice.startswith(f"k=1 lets {missed + at_random:.0%} of Unreliable transitions through")
+    assert f"k=10 {diagnosis.accepted_unreliable(10):.0%}: use k=10" in advice
+    lost = 1 - diagnosis.reliable_recall
+    assert (f"costs {lost:.0%} of the Reliable ones." in advice) == (costs is None)
+    assert (f"recall of Reliable of {costs} many transitions are lost" in advice) == bool(costs)
+    assert ("collect with labels='executed' first" in advice) == (bool(costs) and not executed)
+
+
+def test_there_are_no_more_warnings_than_one_reads(rng):
+    """Few plans, missed onsets, k, calibration, a constant and a duplicate feature are six."""
+    plans = [[RELIABLE] * 2 + [UNRELIABLE] * (i < 15) for i in range(80)]
+    y = np.concatenate(plans)
+    answers = (y == RELIABLE) | (np.cumsum(y == UNRELIABLE) > 7)
+    X = np.column_stack([answers, 1.0 - answers, np.ones(len(y)), answers])
+    diagnosis = diagnose(scripted(), table(X, plans), Table(4))
+    assert len(diagnosis.warnings) == 5
+    assert "has the same value" in diagnosis.warnings[-1]
 
 
 def test_overconfidence_is_noticed(rng):
     data = executed_steps(rng, noise=0.8)
-    assert diagnose(LogisticRegression(), data, Table(3)).warnings == []
-    (warning,) = diagnose(Sure(), data, Table(3)).warnings
+    assert faults(diagnose(LogisticRegression(), data, Table(3))) == []
+    (warning,) = faults(diagnose(Sure(), data, Table(3)))
     assert re.match(r"Probabilities are off by 0\.\d\d on average.*CalibratedClassifierCV", warning)
 
 
@@ -355,7 +394,7 @@ def test_figures_of_few_plans_are_called_uncertain(rng, n_bad, few):
     if few:
         assert "collect more plans" in diagnosis.warnings[0]
     else:
-        assert diagnosis.warnings == []
+        assert faults(diagnosis) == []
 
 
 @pytest.mark.parametrize(("label", "word"), [(RELIABLE, "Reliable"), (UNRELIABLE, "Unreliable")])
@@ -417,14 +456,16 @@ def test_the_table_says_what_the_numbers_are(rng):
     diagnosis = diagnose(LogisticRegression(), pushed_box(rng), Table(4))
     lines = str(diagnosis).splitlines()
     assert lines[0].endswith("clone that has not seen its plan (5 folds)")
-    shown = {line[:44].strip(): line[44:].strip() for line in lines[1:14]}
+    shown = {line[:44].strip(): line[44:].strip() for line in lines[1:16]}
     assert shown["accuracy"] == f"{diagnosis.accuracy:.3f}"
     assert shown["base rate (one label for every transition)"] == f"{diagnosis.base_rate:.3f}"
     assert shown["of these, only say: already diverged"].startswith("0.93")
     assert shown["recall of divergence onsets"] == f"{diagnosis.onset_recall:.3f}"
     assert shown["features"] == "4"
     assert lines[-1] == f"1. {diagnosis.warnings[0]}"
-    assert max(map(len, lines[:15])) < 100
+    through = diagnosis.accepted_unreliable(10)
+    assert shown["Unreliable that k=10 lets through"] == f"{through:.3f}"
+    assert max(map(len, lines[:16])) < 100
     assert repr(diagnosis) == str(diagnosis)
 
 

@@ -25,6 +25,11 @@ PACKAGES = (systems, reliability, planners)
     [
         "reliability.classifier",
         "reliability.diagnosis",
+        "reliability.feature_comparison",
+        "systems.features.body_frame",
+        "systems.features.directions",
+        "systems.features.mujoco_obstacles",
+        "systems.features.ray_distances",
         "planners.execution",
         "planners.planner_evaluation",
         "planners.rrt",
@@ -73,7 +78,9 @@ def test_the_readmes_rope_scene_can_be_learned(tmp_path, monkeypatch, capsys):
     assert "The plan reaches the goal." in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("document", ["README.md", "CONTRIBUTING.md", "examples/README.md"])
+@pytest.mark.parametrize(
+    "document", ["README.md", "CONTRIBUTING.md", "docs/features.md", "examples/README.md"]
+)
 def test_what_documents_mention_exists(document):
     text = (ROOT / document).read_text()
     for name in set(re.findall(r"(?<![\w./])(?:systems|reliability|planners)(?:\.\w+)+", text)):
@@ -124,6 +131,9 @@ def test_every_public_name_documents_what_it_takes(thing):
         (
             "mujoco",
             {
+                "systems/features/holding_load.py",
+                "systems/features/mujoco_models.py",
+                "systems/features/mujoco_obstacles.py",
                 "systems/planar_arm/simulation.py",
                 "systems/rope/renderer.py",
                 "systems/rope/simulation/mujoco_engine.py",

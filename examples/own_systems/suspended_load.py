@@ -2,17 +2,14 @@
 
 from functools import cached_property
 from pathlib import Path
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 
-from systems import Problem, Rollout, StopReason, System
+from systems import MujocoObstacles, Problem, Rollout, StopReason, System
 
 MODEL_FILE = Path(__file__).with_name("suspended_load.xml")
-STACKS = ElementTree.parse(MODEL_FILE).findall(".//geom[@class='stack']")  # and the floor
-STACK_CENTRES = np.array([stack.get("pos").split() for stack in STACKS], dtype=float)
-STACK_HALF_SIZES = np.array([stack.get("size").split() for stack in STACKS], dtype=float)
+free_space = MujocoObstacles(MODEL_FILE)  # of points, shape (..., 3): stacks and floor
 TROLLEY_HEIGHT, LOAD_RADIUS = 4.0, 0.2  # metres
 COMMAND_DURATION, CONTROL_PERIOD = 1.0, 0.1  # seconds
 MUJOCO_STEPS = 5  # of 0.02 s in each control period
@@ -104,10 +101,3 @@ class SuspendedLoad(System):
 
     def succeeded(self, state, goal, tolerance):
         return bool((np.linalg.norm(goal - self.reduce(state), axis=1) < tolerance).any())
-
-
-def free_space(points):
-    """Return how far points, shape (..., 3), are from the nearest stack or floor, in metres."""
-    beyond = np.abs(points[..., None, :] - STACK_CENTRES) - STACK_HALF_SIZES
-    outside = np.linalg.norm(np.maximum(beyond, 0), axis=-1)
-    return (outside + np.minimum(beyond.max(axis=-1), 0)).min(axis=-1)

@@ -2,22 +2,28 @@
 
 from functools import cached_property
 from pathlib import Path
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 
-from systems import Problem, Rollout, StopReason, System
+from systems import (
+    MujocoObstacles,
+    Problem,
+    Rollout,
+    StopReason,
+    System,
+    from_body_frame,
+    motion_in_body_frame,
+)
 
 MODEL_FILE = Path(__file__).with_name("tractor_trailer.xml")
-PILLARS = ElementTree.parse(MODEL_FILE).findall(".//geom[@class='obstacle'][@type='cylinder']")
-PILLAR_CENTRES = np.array([pillar.get("pos").split()[:2] for pillar in PILLARS], dtype=float)
-PILLAR_RADII = np.array([pillar.get("size").split()[0] for pillar in PILLARS], dtype=float)
+# The distance of points, shape (..., 2), from the nearest pillar or wall.
+free_space = MujocoObstacles(MODEL_FILE, ignore=["floor"], height=0.3)
 ROOM = 6.0  # metres along each wall
 TRACTOR_RADIUS, TRACK, WHEEL_RADIUS = 0.32, 0.32, 0.1  # metres
 TOP_SPEED, TOP_TURN_RATE, LONGEST_COMMAND = 0.6, 1.5, 3.0  # m/s, rad/s and s
-# Where the features measure the free space, in the tractor's frame: ahead + left * 1j.
-SENSED = np.array([a + 1j * b for a in (-0.8, -0.4, 0, 0.4) for b in (-0.5, 0, 0.5)])
+# Where the features measure the free space, in the tractor's frame: ahead and left.
+SENSED = np.array([(a, b) for a in (-0.8, -0.4, 0, 0.4) for b in (-0.5, 0, 0.5)])
 
 
 class TractorTrailer(System):
@@ -88,12 +94,9 @@ class TractorTrailer(System):
 
     def features(self, reduced, next_reduced):
         """Describe the motion and the free space around, as seen from the tractor."""
-        position, forward = reduced[:, :2] @ [[1], [1j]], np.exp(1j * reduced[:, 2:])
-        turn = np.exp(1j * next_reduced[:, 2:]) / forward
-        length = np.linalg.norm((next_reduced - reduced)[:, :2], axis=1, keepdims=True)
-        sensed = position + forward * SENSED
-        space = np.minimum(free_space(np.stack([sensed.real, sensed.imag], axis=-1)), 1)
-        return np.hstack([turn.real, turn.imag, length / self.step_size, space])
+        motion = motion_in_body_frame(reduced, next_reduced) / [*[self.step_size] * 2, 1, 1]
+        space = np.minimum(free_space(from_body_frame(reduced, SENSED)), 1)
+        return np.hstack([motion, space])
 
     def sample_problem(self, random_state=None):
         """Draw a start at rest, the trailer straight behind, and a point roughly ahead."""
@@ -112,9 +115,3 @@ class TractorTrailer(System):
 
     def succeeded(self, state, goal, tolerance):
         return bool((np.linalg.norm(goal - state[:2], axis=1) < tolerance).any())
-
-
-def free_space(points):
-    """Return how far points, shape (..., 2), are from the nearest pillar or wall, in metres."""
-    gaps = np.linalg.norm(points[..., None, :] - PILLAR_CENTRES, axis=-1) - PILLAR_RADII
-    return np.minimum(gaps.min(axis=-1), np.minimum(points, ROOM - points).min(axis=-1))

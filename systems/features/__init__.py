@@ -1,0 +1,1 @@
+"""Building blocks for the ``features`` of a system of one's own."""
