@@ -301,12 +301,32 @@ def test_nothing_is_told_where_few_are_accepted_or_by_another_rule(estimator, pa
     assert not shown(lambda: plan(BiasedRRT(Disc(), estimator, **parameters)))
 
 
+@pytest.mark.parametrize("acceptance", ["probability", "temperature"])
+def test_rounds_explore_by_the_planners_rule(acceptance):
+    def learned(acceptance):
+        return learn_in_rounds(
+            LogisticRegression(),
+            BiasedRRTConnect(Disc(), accuracy=0.9, acceptance=acceptance, max_iterations=500),
+            Disc(),
+            n_rounds=2,
+            n_plans=20,
+            exploring_k=2,
+            random_state=0,
+        )
+
+    result, again, fixed = (learned(rule) for rule in (acceptance, acceptance, "fixed"))
+    np.testing.assert_array_equal(result.transitions.reduced, again.transitions.reduced)
+    first = [one.transitions[one.round == 0].reduced for one in (result, fixed)]
+    np.testing.assert_array_equal(*first, "without an estimator rules are all the same")
+    assert not np.array_equal(result.transitions.reduced, fixed.transitions.reduced)
+
+
 def test_nothing_is_told_where_exploring_is_meant():
     estimator, template = LogisticRegression(), BiasedRRT(Disc(), accuracy=0.77)
 
     def explore():
         learn_in_rounds(
-            estimator, template, Disc(), n_rounds=2, n_plans=40, exploring_k=0.5, random_state=0
+            estimator, template, Disc(), n_rounds=2, n_plans=20, exploring_k=0.5, random_state=0
         )
         asked = BiasedRRT(Disc(), estimator.fit(*disc_data()), accuracy=0.77)
         collect_transitions(Disc(), asked, 3, random_state=0)
