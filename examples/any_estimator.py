@@ -43,7 +43,7 @@ for name, estimator in ESTIMATORS.items():
     n_solved, n_arrived, seconds = 0, 0, []
     for i in range(N_PROBLEMS):
         problem = arm.sample_reaching_problem(i)
-        planner = BiasedRRTConnect(arm, estimator, accuracy=accuracy, random_state=i)
+        planner = BiasedRRTConnect(arm, estimator, k=10, accuracy=accuracy, random_state=i)
         plan = planner.plan(problem.start, problem.goal)
         final = arm.rollout(problem.start, plan.commands).states[-1]
         n_solved += plan.success

@@ -27,7 +27,7 @@ hanging, standing = np.array([-np.pi / 2, 0, 0]), np.array([np.pi / 2, 0, 0])
 
 def move(estimator, start, goal):
     """Plan and execute; return planned and executed joint angles, and whether the arm arrived."""
-    plan = BiasedRRTConnect(arm, estimator, random_state=0).plan(start, goal)
+    plan = BiasedRRTConnect(arm, estimator, k=10, random_state=0).plan(start, goal)
     executed = arm.rollout(start, plan.commands).states
     return plan.reduced, executed, plan.success and arm.succeeded(executed[-1], goal, 0.1)
 

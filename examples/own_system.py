@@ -54,6 +54,6 @@ classifier = TransitionReliabilityClassifier(random_state=0)
 classifier.fit(data.features(point), data.y, groups=data.plan)
 start, goal = np.array([0.5, 1.0]), np.array([[0.5, 3.0]])
 for name, estimator in (("without", None), ("with", classifier)):
-    plan = BiasedRRTConnect(point, estimator, random_state=0).plan(start, goal)
+    plan = BiasedRRTConnect(point, estimator, k=10, random_state=0).plan(start, goal)
     end = point.rollout(start, plan.commands).states[-1]
     print(f"{name} the classifier, the point ends at {end.round(2)} for a goal of {goal[0]}")

@@ -19,7 +19,7 @@ print(f"{len(data)} transitions, held-out accuracy {classifier.validation_accura
 # Plan with and without the classifier, from hanging down to standing up, and execute both plans.
 hanging, standing = np.array([-np.pi / 2, 0, 0]), np.array([np.pi / 2, 0, 0])
 for name, estimator in (("without", None), ("with", classifier)):
-    plan = BiasedRRTConnect(arm, estimator, random_state=0).plan(hanging, standing)
+    plan = BiasedRRTConnect(arm, estimator, k=10, random_state=0).plan(hanging, standing)
     final = arm.rollout(hanging, plan.commands).states[-1]
     stands = arm.succeeded(final, standing[None], tolerance=0.1)
     print(f"{name} the classifier: {plan.status.value} Does the arm stand? {stands}")

@@ -1,3 +1,4 @@
+from .acceptance import PermissiveAcceptanceWarning as PermissiveAcceptanceWarning
 from .check_transition import CheckTransition as CheckTransition
 from .comparison import Comparison as Comparison
 from .edge_checker import EdgeChecker as EdgeChecker

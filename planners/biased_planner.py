@@ -15,6 +15,7 @@ from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 from threadpoolctl import threadpool_limits
 
+from planners.acceptance import resolve_accuracy, warn_if_permissive
 from planners.budget import Budget, never
 from planners.check_transition import CheckTransition
 from planners.edge_checker import EdgeChecker
@@ -77,6 +78,7 @@ class BiasedPlanner(BaseEstimator):
     _: KW_ONLY
     k: float = 1.0
     accuracy: float | None = None
+    acceptance: str = "fixed"
     simplify: bool = True
     max_iterations: int = 20_000
     time_limit: float | None = None
@@ -139,6 +141,11 @@ class BiasedPlanner(BaseEstimator):
         PlanResult
         """
         self._check_parameters()
+        if self.estimator is not None and self.acceptance == "fixed":
+            p_acc = resolve_accuracy(self.estimator, self.accuracy)
+            check_number(self.k, "k", 0, np.inf)
+            # Shown at the line that calls plan.
+            warn_if_permissive(self.k, p_acc, stacklevel=3)
         attempts = self._attempts(starts_reduced, goal, terminated)
         best = best_until_enough(attempts, self.min_success, lambda plan: plan.success_probability)
         return self._judged(best)
@@ -253,7 +260,12 @@ class BiasedPlanner(BaseEstimator):
         for_search, for_ompl = np.random.SeedSequence(seed).spawn(2)
         rng = np.random.default_rng(for_search)
         check = CheckTransition(
-            self.system, self.estimator, k=self.k, accuracy=self.accuracy, rng=rng
+            self.system,
+            self.estimator,
+            k=self.k,
+            accuracy=self.accuracy,
+            rng=rng,
+            acceptance=self.acceptance,
         )
         problem = PlanningProblem.checked(self.system, starts, goal, rng)
         problem = problem.with_trusted_goals(check)

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.acceptance import make_acceptance
 from planners.estimator_adapter import adapt_estimator
 from systems.system import Array, System
-from systems.validation import check_number
 
 
 class CheckTransition:
-    """Accepts Reliable transitions, and Unreliable ones with a small probability.
+    """Accepts Reliable transitions, and of Unreliable ones those that a rule lets through.
 
     Parameters
     ----------
@@ -24,11 +24,14 @@ class CheckTransition:
         are 1 and 0, or "reliable" and "unreliable" in any case. Where
         :func:`reliability.compile_inference` knows the estimator, it is asked through that.
     k : float
-        An Unreliable transition is accepted with the probability exp(-k * p_acc).
+        How strict the rule is; infinite rejects every Unreliable transition.
     accuracy : float or None
-        p_acc; None takes the estimator's ``validation_accuracy_``.
+        p_acc, of which the rule "fixed" makes use; None takes the estimator's
+        ``validation_accuracy_``.
     rng : Generator
         Source of the draws, one for each Unreliable transition each time that it is checked.
+    acceptance : {"fixed", "probability", "temperature"}, default="fixed"
+        The rule, as :class:`BiasedRRT` describes it.
 
     Attributes
     ----------
@@ -38,7 +41,8 @@ class CheckTransition:
     Raises
     ------
     ValueError
-        If k or p_acc is out of range, p_acc is unknown, or the estimator doesn't fit the system.
+        If a parameter is out of range, p_acc is unknown where it is needed, the estimator doesn't
+        fit the system, or the rule needs probabilities and the estimator has none.
     sklearn.exceptions.NotFittedError
         If the estimator is not fitted.
 
@@ -55,14 +59,12 @@ class CheckTransition:
         k: float,
         accuracy: float | None,
         rng: np.random.Generator,
+        acceptance: str = "fixed",
     ) -> None:
         self.n_checked = self.n_rejected = self.n_accepted_unreliable = 0
-        self._rng = rng
-        check_number(k, "k", 0, np.inf)
         self._adapter = adapt_estimator(system, estimator)
         self._counts = estimator is not None
-        p_acc = 1.0 if estimator is None else _resolve_accuracy(estimator, accuracy)
-        self._acceptance = 0.0 if k == np.inf else float(np.exp(-k * p_acc))
+        self._acceptance = make_acceptance(acceptance, estimator, k, accuracy, rng)
 
     @property
     def answers_fast(self) -> bool:
@@ -80,11 +82,17 @@ class CheckTransition:
         -------
         accepted : ndarray of bool of shape (n,)
         """
-        accepted = self.classify(reduced, next_reduced)
+        cost = np.zeros(len(reduced))
+        if self._acceptance.needs_cost:
+            accepted, probability = self.evaluate(reduced, next_reduced)
+            cost = negative_log_likelihood(probability)
+        else:
+            accepted = self.classify(reduced, next_reduced)
         n_reliable = int(np.count_nonzero(accepted))
         n_unreliable = len(accepted) - n_reliable
         if n_unreliable:
-            accepted[~accepted] = self._rng.random(n_unreliable) < self._acceptance
+            unreliable = ~accepted
+            accepted[unreliable] = self._acceptance.draw(cost[unreliable])
             n_lucky = int(np.count_nonzero(accepted)) - n_reliable
             self.n_accepted_unreliable += n_lucky
             self.n_rejected += n_unreliable - n_lucky
@@ -108,16 +116,3 @@ class CheckTransition:
 def negative_log_likelihood(probability: Array) -> Array:
     """Return -log of the probability that a transition is Reliable; a plan's add up."""
     return -np.log(np.maximum(probability, 1e-12))
-
-
-def _resolve_accuracy(estimator: Any, accuracy: float | None) -> float:
-    if accuracy is None:
-        accuracy = getattr(estimator, "validation_accuracy_", None)
-    if accuracy is None or (isinstance(accuracy, float) and np.isnan(accuracy)):
-        raise ValueError(
-            f"accuracy (p_acc) is not known: {type(estimator).__name__} has no "
-            "validation_accuracy_ of held-out data. Pass accuracy, measured on plans that the "
-            "estimator was not fitted on."
-        )
-    check_number(accuracy, "accuracy", 0, 1)
-    return float(accuracy)

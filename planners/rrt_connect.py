@@ -32,10 +32,25 @@ class BiasedRRTConnect(BiasedPlanner):
     estimator : estimator, default=None
         Any fitted classifier of ``system.features``; None plans without bias.
     k : float, default=1.0
-        An Unreliable transition is accepted with the probability exp(-k * p_acc); np.inf rejects
-        every one.
+        How strict the search is, see ``acceptance``; np.inf rejects every Unreliable transition.
+        The default is the smallest that makes sense: with p_acc 0.9 it accepts 41 % of them, and
+        planners then warn (:class:`PermissiveAcceptanceWarning`). k=10 accepts 0.01 %.
     accuracy : float, default=None
-        p_acc, the estimator's accuracy on held-out data. None takes ``validation_accuracy_``.
+        p_acc, the estimator's accuracy on held-out data, which only "fixed" needs. None takes
+        ``validation_accuracy_``.
+    acceptance : {"fixed", "probability", "temperature"}, default="fixed"
+        How the search accepts transitions that the estimator calls Unreliable; Reliable ones are
+        always accepted.
+
+        - "fixed": each with the probability exp(-k * p_acc), the paper's Algorithm 1.
+        - "probability": each with p ** k, where p is the estimator's own probability that this
+          transition is Reliable. With k=1 its label is drawn from what the estimator believes; with
+          k=3, three such draws have to be Reliable: 0.06 for p = 0.4, and 0.001 for p = 0.1.
+        - "temperature": each with p ** (1 / T), with a temperature T that begins at 1 / k, doubles
+          each time that 100 Unreliable transitions have been rejected in a row, and halves when one
+          is accepted. A search that is stuck takes ever greater risks, the smallest first.
+
+        The last two need ``predict_proba``, and are as good as its probabilities are calibrated.
     transitions_per_edge : int, default=5
         Longest edge of the trees, in transitions. An edge is added only if every one of its
         transitions is accepted, so the longer the edges, the stronger the bias at the same k.
@@ -58,7 +73,8 @@ class BiasedRRTConnect(BiasedPlanner):
 
     References
     ----------
-    Kuffner and LaValle 2000; McConachie et al. 2020, Algorithm 1.
+    Kuffner and LaValle 2000; McConachie et al. 2020, Algorithm 1; for the temperature Jaillet,
+    Cortés and Siméon 2010 (T-RRT).
 
     Examples
     --------

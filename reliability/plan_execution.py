@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from reliability.exploration import exploring
 from reliability.item_files import Item
 from reliability.labels import label_executed_transitions, label_transitions
 from reliability.scenes import SceneFamily, plan_seeds
@@ -156,7 +157,8 @@ class PlanTask:
     def _item(self, system: System, problem: Problem, random_state: int) -> Item:
         planner = copy.copy(self.planner)
         planner.system, planner.random_state = system, random_state
-        plan = planner.plan(system.reduce(problem.start), problem.goal)
+        with exploring():
+            plan = planner.plan(system.reduce(problem.start), problem.goal)
         if not plan.success:
             return Item({"outcome": UNSOLVED})
         rollout = system.rollout(problem.start, plan.commands)

@@ -335,9 +335,8 @@ def test_estimators_fitted_on_tables_with_names_are_asked_with_names(estimator):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         reliable, probability = checker(estimator).evaluate(before, after)
-        plan = BiasedRRT(Disc(), estimator, accuracy=0.9, random_state=0).plan(
-            [-0.9, 0.1], [-0.5, 0.8]
-        )
+        planner = BiasedRRT(Disc(), estimator, k=10, accuracy=0.9, random_state=0)
+        plan = planner.plan([-0.9, 0.1], [-0.5, 0.8])
     assert plan.success
     np.testing.assert_array_equal(reliable, estimator.predict(asked) == 1)
     np.testing.assert_array_equal(probability, estimator.predict_proba(asked)[:, 1])

@@ -6,6 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import joblib
+
+from benchmarks.acceptance import SETTINGS
+from benchmarks.acceptance import main as compare_acceptance
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -62,3 +67,20 @@ def test_rope_example_shows_a_rope_that_got_caught_and_one_that_did_not(tmp_path
     assert "Every command was carried out" in shown
     pictures = {file.name for file in (tmp_path / "simple_hook_short").iterdir()}
     assert pictures == {"caught.png", "worked.png", "caught_and_worked.gif"}
+
+
+def test_acceptance_rules_are_compared_on_the_same_problems(tmp_path, arm_classifier):
+    (tmp_path / "arm").mkdir()
+    joblib.dump(arm_classifier, tmp_path / "arm" / "arm.joblib")
+    table = tmp_path / "acceptance" / "table.md"
+    kept = {}
+    for n_problems in (2, 3):
+        options = ("--systems", "arm", "--problems", n_problems, "--out", table.parent)
+        compare_acceptance([str(option) for option in options])
+        rows = [line.split(" | ") for line in table.read_text().splitlines()[2:]]
+        assert [(row[1], float(row[2])) for row in rows] == list(SETTINGS)
+        assert all(f"of {n_problems}, " in row[3] for row in rows)
+        files = {file: file.read_bytes() for file in table.parent.glob("*/*.item")}
+        assert len(files) == n_problems * len(SETTINGS)
+        assert kept.items() <= files.items(), "more problems go on where fewer stopped"
+        kept = files
