@@ -34,6 +34,10 @@ class SuccessCalibration(BaseEstimator):
     reliable and of its last transition. The last counts by itself because with labels after Eq. 3
     it is Reliable if the execution is where the plan ends.
 
+    What it learns is how often a plan goes well if the true system goes the way that g predicts. A
+    plan with a ``robustness`` does so only with that probability, which the learned one is
+    multiplied by; and in learning, a plan weighs as much as its robustness.
+
     Fit it on plans made by the planner that will use it (with the same estimator, the same k and so
     on), for problems that the estimator has not learned from. A hundred plans are few.
 
@@ -101,7 +105,8 @@ class SuccessCalibration(BaseEstimator):
             )
         self.classes_ = np.array([False, True])
         self.model_ = make_pipeline(StandardScaler(), LogisticRegression())
-        self.model_.fit(_features(results), y)
+        weights = {"logisticregression__sample_weight": _robustness(results)}
+        self.model_.fit(_features(results), y, **weights)
         self._keep_levels(self._probability(results))
         return self
 
@@ -200,7 +205,8 @@ class SuccessCalibration(BaseEstimator):
         return float(levels[n_passed - 1])
 
     def _probability(self, results: Sequence[PlanResult]) -> Array:
-        return np.asarray(self.model_.predict_proba(_features(results))[:, 1])
+        as_predicted = self.model_.predict_proba(_features(results))[:, 1]
+        return np.asarray(as_predicted * _robustness(results))
 
     def _keep_levels(self, probability: Array) -> None:
         quantiles = np.quantile(probability, np.arange(1, N_PARTS) / N_PARTS)
@@ -228,6 +234,11 @@ def _features(results: Sequence[PlanResult]) -> Array:
         total, worst, last = np.log1p([costs.sum(), costs.max(initial=0.0), costs[-1:].sum()])
         rows.append([total, len(costs), worst, last])
     return np.array(rows)
+
+
+def _robustness(results: Sequence[PlanResult]) -> Array:
+    known = (result.robustness for result in results)
+    return np.array([1.0 if share is None else share for share in known])
 
 
 def _checked_outcomes(results: Sequence[PlanResult], succeeded: ArrayLike) -> NDArray[np.bool_]:
