@@ -79,9 +79,7 @@ def compare_restarts(name: str, options: argparse.Namespace) -> None:
     for label, outcomes in (("once", once), ("with restarts", again)):
         share = Share.of(sum(one.succeeded for one in outcomes), len(outcomes))
         trusted = [one.succeeded for one in outcomes if one.plan.success]
-        seconds = np.mean(
-            [one.plan.planning_time + one.plan.simplification_time for one in outcomes]
-        )
+        times = [one.plan.planning_time + one.plan.simplification_time for one in outcomes]
         print(
             f"{name}, {label}: {share} succeed; of those that the planner trusts "
             f"{Share.of(sum(trusted), len(trusted))}; {np.mean(times):.2f} s a problem"

@@ -103,8 +103,8 @@ class Worth:
 
 
 HEAD = (
-    "| system | plans that succeed | no plan | ECE of the product | ECE | ECE by chance, mean and 95 % "
-    "| AUC of the product | AUC | min_success | of those accepted succeed |\n"
+    "| system | plans that succeed | no plan | ECE of the product | ECE | ECE by chance, mean and "
+    "95 % | AUC of the product | AUC | min_success | of those accepted succeed |\n"
     "|---|---|---|---|---|---|---|---|---|---|"
 )
 
