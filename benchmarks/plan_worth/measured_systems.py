@@ -86,9 +86,9 @@ _CONNECT = BiasedRRTConnect(None, k=10.0, max_iterations=5000)
 _CAR = BiasedRRTConnect(None, k=10.0, transitions_per_edge=1, max_iterations=5000)
 _RRT = BiasedRRT(None, k=10.0, max_iterations=5000)
 SYSTEMS = {
-    "arm": MeasuredSystem(PlanarArm(), _CONNECT, 0.1, 300, (400, 300, 600)),
+    "arm": MeasuredSystem(PlanarArm(), _CONNECT, 0.1, 300, (400, 300, 750)),
     "car": MeasuredSystem(_car, _CAR, 0.3, 400, (400, 300, 600)),
     "rope": MeasuredSystem(_rope, _RRT, 0.025, 0, (120, 80, 120)),
     "tractor": MeasuredSystem(TractorTrailer(), _RRT, 0.1, 300, (400, 300, 600)),
-    "load": MeasuredSystem(SuspendedLoad(), _CONNECT, 0.3, 300, (400, 300, 600)),
+    "load": MeasuredSystem(SuspendedLoad(), _CONNECT, 0.3, 300, (500, 400, 700)),
 }

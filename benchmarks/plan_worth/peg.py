@@ -23,7 +23,7 @@ from systems import Box, Cylinder, Problem, Rope, Scene
 
 MODEL = Path(__file__).parents[1] / "rope" / "models" / "rope_ours.joblib"
 TOLERANCE = 0.025
-RANDOM_STATE = 77
+RANDOM_STATE = 78
 HEAD = -0.05
 # Plans that fewer of the varied models agree on are made again.
 ENOUGH = 0.9
@@ -50,7 +50,8 @@ def main(arguments: list[str] | None = None) -> None:
     for name in options.estimators:
         plain = planner(name)
         careful = planner(name).set_params(min_success=ENOUGH, restarts=options.restarts)
-        for label, one in (("once", plain), ("restarts", careful)):
+        roads = [("once", plain), ("restarts", careful)][: 1 + bool(options.restarts)]
+        for label, one in roads:
             evaluation = evaluate(
                 peg_rope,
                 one,

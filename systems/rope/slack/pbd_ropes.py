@@ -26,9 +26,10 @@ from systems.rope.slack.pbd_kernels import PbdModel
 # disagree, the outcome is uncertain.
 KINDS = np.array([[0.35, ROPE_RADIUS + 0.002], [0.25, ROPE_RADIUS + 0.004]])
 # Least and greatest factor of the friction in varied models. Where slack is dragged over the head
-# of a thin peg, nodes slide over it one by one, and the true rope holds as if its friction were
-# twice to three times as much; on flat surfaces it does not.
-FRICTION_FACTORS = (0.5, 4.0)
+# of a thin peg, nodes slide over it one by one, and the true rope often holds where a PBD rope
+# would if its friction were one and a half times to three times as much. With more than twice as
+# much, PBD ropes also get caught on hooks that true ropes pass.
+FRICTION_FACTORS = (0.5, 2.0)
 
 
 def pbd_dim(scene: Scene) -> int:
