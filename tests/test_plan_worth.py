@@ -26,7 +26,7 @@ def test_true_probabilities_show_an_error_that_shrinks_with_the_number_of_plans(
 
 
 def test_a_table_a_picture_and_restarts(tmp_path, monkeypatch, capsys):
-    small = replace(measured_systems.SYSTEMS["arm"], n_training_plans=40)
+    small = replace(measured_systems.SYSTEMS["arm"], learned_from=40)
     monkeypatch.setitem(measured_systems.SYSTEMS, "arm", small)
     monkeypatch.setattr("benchmarks.plan_worth.__main__.N_RESTART_PROBLEMS", 4)
     arguments = ["--systems", "arm", "--plans", "30", "20", "25", "--out", str(tmp_path)]
