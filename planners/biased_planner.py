@@ -20,6 +20,7 @@ from planners.budget import Budget, never
 from planners.check_transition import CheckTransition
 from planners.edge_checker import EdgeChecker
 from planners.path import Path
+from planners.plan_robustness import plan_robustness
 from planners.planning_problem import PlanningProblem
 from planners.restarts import best_until_enough
 from planners.result import PlanResult, PlanStatus
@@ -29,6 +30,9 @@ from planners.success_calibration import SuccessCalibration
 from systems.goal_region import GoalRegion
 from systems.system import Array, System
 from systems.validation import RandomState, as_seed, check_count, check_number, is_integer
+
+# No restart has this number, so that none has these random numbers.
+_FOR_ROBUSTNESS = (2**32 - 1,)
 
 
 class Search(NamedTuple):
@@ -180,8 +184,16 @@ class BiasedPlanner(BaseEstimator):
             found = self._search(search)
             searched = time.perf_counter()
             path = self._shortened(found, search)
+            robustness = self._robustness(path, seed)
         times = searched - began, time.perf_counter() - searched
-        return self._calibrated(self._report(search, found, path, times, seed))
+        report = self._report(search, found, path, times, seed)
+        return self._calibrated(replace(report, robustness=robustness))
+
+    def _robustness(self, path: Path | None, seed: int) -> float | None:
+        if path is None or self.estimator is None:
+            return None
+        sequence = np.random.SeedSequence(seed, spawn_key=_FOR_ROBUSTNESS)
+        return plan_robustness(self.system, path, np.random.default_rng(sequence))
 
     def _calibrated(self, plan: PlanResult) -> PlanResult:
         if self.calibration is None or not plan.solved:

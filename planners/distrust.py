@@ -85,7 +85,9 @@ class DistrustedTransitions:
             return following, trusted
 
         view = copy.copy(system)
-        object.__setattr__(view, "propagate", trusted)  # a system may be a frozen dataclass
+        # A system may be a frozen dataclass. Variants of a view would be the view itself.
+        object.__setattr__(view, "propagate", trusted)
+        object.__setattr__(view, "vary", system.vary)
         return view
 
     def _motions(self, reduced: Array, next_reduced: Array) -> Array:

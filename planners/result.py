@@ -15,7 +15,7 @@ from reliability.archive import read_arrays, write_arrays
 FORMAT_VERSION = 2
 Array = NDArray[np.float64]
 # Left out of a file where they are None.
-_MAY_BE_NONE = frozenset({"reliability", "calibrated_probability"})
+_MAY_BE_NONE = frozenset({"reliability", "calibrated_probability", "robustness"})
 
 
 class PlanStatus(Enum):
@@ -70,6 +70,10 @@ class PlanResult:
     calibrated_probability : float or None, default=None
         Probability that the plan goes well, from the planner's ``calibration``; None where the
         planner has none or there is no plan.
+    robustness : float or None, default=None
+        Share of slightly varied models that predict the same end as the plan; None without a plan
+        or an estimator, or if the system does not define ``vary``. See
+        :func:`planners.plan_robustness.plan_robustness`.
     """
 
     reduced: Array
@@ -84,6 +88,7 @@ class PlanResult:
     tree: Array
     random_state: int
     calibrated_probability: float | None = None
+    robustness: float | None = None
 
     @property
     def solved(self) -> bool:
@@ -99,11 +104,13 @@ class PlanResult:
     def success_probability(self) -> float:
         """Probability that the plan goes well.
 
-        It is ``calibrated_probability`` if the planner has a calibration, else
-        ``reliability_product``, which orders plans well and is no frequency of success.
+        It is ``calibrated_probability`` if the planner has a calibration. Else it is
+        ``reliability_product`` times ``robustness``, if that is known; this orders plans well and
+        is no frequency of success.
         """
-        calibrated = self.calibrated_probability
-        return self.reliability_product if calibrated is None else calibrated
+        if self.calibrated_probability is not None:
+            return self.calibrated_probability
+        return self.reliability_product * (1.0 if self.robustness is None else self.robustness)
 
     @property
     def reliability_product(self) -> float:

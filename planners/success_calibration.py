@@ -21,6 +21,12 @@ from systems.validation import check_number
 
 # Thresholds that min_success_for may return lie between this many equal parts of the plans.
 N_PARTS = 20
+# Costs enter by their logarithms: a doubt of one in a thousand tells something that one in ten
+# thousand does not, and a few transitions of probability 0 can't outweigh all else. Below this
+# cost, differences tell nothing.
+LEAST_COST = 1e-4
+# Enough for plans of any robustness; with robust plans only, there is nothing to be repeated.
+N_EXPECTATIONS = 20
 
 
 class SuccessCalibration(BaseEstimator):
@@ -29,10 +35,14 @@ class SuccessCalibration(BaseEstimator):
     The product of the reliabilities is that probability only if transitions fail independently of
     one another and the estimator's probabilities are right; it is mostly far too low. The
     calibration learns from executed plans how often plans like this one went well: logistic
-    regression on the plan's negative log-likelihood (the sum of -log(reliability) of its
-    transitions), on the number of its transitions, and on the negative log-likelihoods of its least
-    reliable and of its last transition. The last counts by itself because with labels after Eq. 3
-    it is Reliable if the execution is where the plan ends.
+    regression on the number of the plan's transitions, and on the logarithms of three negative
+    log-likelihoods: that of the plan (the sum of -log(reliability) of its transitions), that of its
+    least reliable transition, and that of its last. The last counts by itself because with labels
+    after Eq. 3 it is Reliable if the execution is where the plan ends.
+
+    What it learns is how often a plan goes well if the true system goes the way that g predicts. A
+    plan with a ``robustness`` does so only with that probability, by which the learned one is
+    multiplied.
 
     Fit it on plans made by the planner that will use it (with the same estimator, the same k and so
     on), for problems that the estimator has not learned from. A hundred plans are few.
@@ -51,7 +61,7 @@ class SuccessCalibration(BaseEstimator):
 
     References
     ----------
-    Platt 1999.
+    Platt 1999. Dempster, Laird and Rubin 1977, for expectation maximisation.
 
     Examples
     --------
@@ -101,7 +111,7 @@ class SuccessCalibration(BaseEstimator):
             )
         self.classes_ = np.array([False, True])
         self.model_ = make_pipeline(StandardScaler(), LogisticRegression())
-        self.model_.fit(_features(results), y)
+        self._fit_model(_features(results), y, _robustness(results))
         self._keep_levels(self._probability(results))
         return self
 
@@ -199,8 +209,21 @@ class SuccessCalibration(BaseEstimator):
             )
         return float(levels[n_passed - 1])
 
+    def _fit_model(self, X: Array, y: NDArray[np.bool_], robustness: Array) -> None:
+        """Learn what becomes of plans that go as predicted, if it is not known which ones do.
+
+        Expectation maximisation: of a plan that failed, the part counts that went as predicted and
+        failed all the same.
+        """
+        weight = np.ones(len(y))
+        for _ in range(N_EXPECTATIONS if (robustness < 1).any() else 1):
+            self.model_.fit(X, y, logisticregression__sample_weight=weight)
+            success = self.model_.predict_proba(X)[:, 1]
+            weight = np.where(y, 1, robustness * (1 - success) / (1 - robustness * success))
+
     def _probability(self, results: Sequence[PlanResult]) -> Array:
-        return np.asarray(self.model_.predict_proba(_features(results))[:, 1])
+        as_predicted = self.model_.predict_proba(_features(results))[:, 1]
+        return np.asarray(as_predicted * _robustness(results))
 
     def _keep_levels(self, probability: Array) -> None:
         quantiles = np.quantile(probability, np.arange(1, N_PARTS) / N_PARTS)
@@ -224,10 +247,16 @@ def _features(results: Sequence[PlanResult]) -> Array:
     for result in results:
         assert result.reliability is not None
         costs = negative_log_likelihood(result.reliability)
-        # The logarithm keeps a few transitions of probability 0 from outweighing all else.
-        total, worst, last = np.log1p([costs.sum(), costs.max(initial=0.0), costs[-1:].sum()])
+        total, worst, last = np.log(
+            LEAST_COST + np.array([costs.sum(), costs.max(initial=0.0), costs[-1:].sum()])
+        )
         rows.append([total, len(costs), worst, last])
     return np.array(rows)
+
+
+def _robustness(results: Sequence[PlanResult]) -> Array:
+    known = (result.robustness for result in results)
+    return np.array([1.0 if share is None else share for share in known])
 
 
 def _checked_outcomes(results: Sequence[PlanResult], succeeded: ArrayLike) -> NDArray[np.bool_]:

@@ -283,6 +283,29 @@ class System(ABC):
         low, high = self.bounds
         return rng.uniform(low, high, size=(n, len(low)))
 
+    def vary(self, rng: np.random.Generator) -> System | None:
+        """Draw a system whose reduced model errs a little differently, to predict plans with.
+
+        Override it where small errors can have large effects: a ball on a ridge, or a rope whose
+        slack lies on the head of a peg and may slide off to either side. Planners then predict
+        each finished plan with several variants, and trust it the less the more of them end
+        elsewhere; see :func:`planners.plan_robustness.plan_robustness`.
+
+        Vary what is not known exactly, such as a friction, a wind or a centre of mass, and vary it
+        as far as it may be wrong. A plan that goes well should go well in nearly all variants.
+
+        Parameters
+        ----------
+        rng : Generator
+
+        Returns
+        -------
+        variant : System or None
+            Most easily a copy with other parameters; planners ask its ``propagate`` only. None,
+            the default, if there is nothing to vary: planners then leave this out.
+        """
+        return None
+
     @abstractmethod
     def goal_reached(self, reduced: Array, goal: Array) -> NDArray[np.bool_]:
         """Say for each row whether a reduced state is at the goal: the paper's Goal_B.

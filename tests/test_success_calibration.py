@@ -26,7 +26,7 @@ START, GOAL = np.array([-0.9, 0.0]), np.array([0.9, 0.0])
 
 
 def costs_of(plan):
-    return np.log1p(-np.log(plan.reliability))
+    return np.log(1e-4 - np.log(plan.reliability))
 
 
 def random_plans(rng, n, *, offset=2.5):
@@ -65,7 +65,8 @@ def test_it_is_logistic_regression_on_sum_length_worst_and_last(rng):
     rows = []
     for plan in plans:
         costs = -np.log(plan.reliability)
-        rows.append([np.log1p(costs.sum()), len(costs), np.log1p(costs.max()), np.log1p(costs[-1])])
+        total, worst, last = np.log([1e-4 + costs.sum(), 1e-4 + costs.max(), 1e-4 + costs[-1]])
+        rows.append([total, len(costs), worst, last])
     X = StandardScaler().fit_transform(rows)
     expected = LogisticRegression().fit(X, succeeded).predict_proba(X)
     calibration = SuccessCalibration().fit(plans, succeeded)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import Any
 
@@ -19,7 +20,12 @@ from systems.rope.simulation.engines import ENGINES
 from systems.rope.simulation.quasistatic import RopeRollout, rope_length
 from systems.rope.simulation.state import RopeState, checked_rope
 from systems.rope.slack.pbd_kernels import propagate_pbd_ropes
-from systems.rope.slack.pbd_ropes import pbd_dim, pbd_model, pbd_ropes_at_rest
+from systems.rope.slack.pbd_ropes import (
+    pbd_dim,
+    pbd_model,
+    pbd_ropes_at_rest,
+    varied_pbd_model,
+)
 from systems.system import Array, Problem, Rollout, System
 from systems.validation import RandomState, as_finite_array, as_generator
 
@@ -135,6 +141,14 @@ class Rope(System):
             ropes, rows, moves, valid, self._pbd_model, self.max_pbd_rope_length
         )
         return np.where(valid[:, None], np.hstack([bands, ropes]), rows), valid
+
+    def vary(self, rng: np.random.Generator) -> Rope | None:
+        """Draw a rope whose PBD ropes rub more or less; None if there are no PBD ropes."""
+        if not self._pbd_dim:
+            return None
+        variant = copy.copy(self)
+        variant._pbd_model = varied_pbd_model(self.scene, rng)
+        return variant
 
     def bands(self, reduced: Array) -> Array:
         """Return reduced states without the PBD ropes, for :mod:`systems.rope.band.band`."""

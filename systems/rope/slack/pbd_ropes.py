@@ -25,6 +25,11 @@ from systems.rope.slack.pbd_kernels import PbdModel
 # links between them cut edges, so the radii are larger than the rope's. Where the two ropes
 # disagree, the outcome is uncertain.
 KINDS = np.array([[0.35, ROPE_RADIUS + 0.002], [0.25, ROPE_RADIUS + 0.004]])
+# Least and greatest factor of the friction in varied models. Where slack is dragged over the head
+# of a thin peg, nodes slide over it one by one, and the true rope often holds where a PBD rope
+# would if its friction were one and a half times to three times as much. With more than twice as
+# much, PBD ropes also get caught on hooks that true ropes pass.
+FRICTION_FACTORS = (0.5, 2.0)
 
 
 def pbd_dim(scene: Scene) -> int:
@@ -35,6 +40,13 @@ def pbd_dim(scene: Scene) -> int:
 def pbd_model(scene: Scene) -> PbdModel:
     """Return what the PBD ropes in this scene are made of, for compiled code."""
     return PbdModel(scene.n_nodes, scene.link_length, KINDS, scene.packed)
+
+
+def varied_pbd_model(scene: Scene, rng: np.random.Generator) -> PbdModel:
+    """Return PBD ropes with another friction, drawn log-uniformly, for compiled code."""
+    kinds = KINDS.copy()
+    kinds[:, 0] *= np.exp(rng.uniform(*np.log(FRICTION_FACTORS)))
+    return PbdModel(scene.n_nodes, scene.link_length, kinds, scene.packed)
 
 
 def pbd_ropes_at_rest(nodes: Array) -> Array:

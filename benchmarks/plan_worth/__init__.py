@@ -1,0 +1,1 @@
+"""What a plan is worth: run ``python -m benchmarks.plan_worth``."""

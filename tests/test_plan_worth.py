@@ -1,0 +1,49 @@
+"""The benchmark of what plans are worth, at small size."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.plan_worth import measured_systems
+from benchmarks.plan_worth.__main__ import main
+from benchmarks.plan_worth.measures import calibration_error, error_of_the_truth
+from benchmarks.plan_worth.peg import peg_rope
+
+
+def test_the_calibration_error_is_the_mean_gap_of_ten_bins():
+    probability = np.array([0.05, 0.05, 0.91, 0.99, 1.0])
+    succeeded = np.array([False, True, True, True, False])
+    gaps = [abs(1 - 0.1), abs(2 - 2.9)]
+    assert calibration_error(probability, succeeded) == pytest.approx(sum(gaps) / 5)
+    assert calibration_error(np.array([0.0, 1.0]), np.array([False, True])) == 0
+
+
+def test_true_probabilities_show_an_error_that_shrinks_with_the_number_of_plans(rng):
+    few, many = (error_of_the_truth(rng.random(n)).mean() for n in (50, 5000))
+    assert 0.05 < few < 0.2
+    assert many < 0.02
+
+
+def test_a_table_a_picture_and_restarts(tmp_path, monkeypatch, capsys):
+    small = replace(measured_systems.SYSTEMS["arm"], learned_from=40)
+    monkeypatch.setitem(measured_systems.SYSTEMS, "arm", small)
+    monkeypatch.setattr("benchmarks.plan_worth.__main__.N_RESTART_PROBLEMS", 4)
+    arguments = ["--systems", "arm", "--plans", "30", "20", "25", "--out", str(tmp_path)]
+    main([*arguments, "--restarts", "1"])
+    shown = capsys.readouterr().out
+    row = next(line for line in shown.splitlines() if line.startswith("| arm "))
+    assert row.count("|") == 11
+    assert "arm, once: " in shown
+    assert "restarts win" in shown
+    assert (tmp_path / "plan_worth.png").stat().st_size > 10_000
+    main(arguments)
+    assert row in capsys.readouterr().out, "the same plans are not made again"
+
+
+def test_pegs_stand_in_the_way():
+    rope = peg_rope(0)
+    problem = rope.sample_problem(1)
+    assert problem.goal[0, 2] < -0.1 < problem.start.grippers[0, 2]
+    peg = rope.scene.obstacles[1]
+    assert peg.center[2] + peg.half_length == pytest.approx(-0.05)
