@@ -8,23 +8,26 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from planners import BiasedRRTConnect, best_of_restarts
-from reliability import FastHistGradientBoostingClassifier, Transitions, collect_transitions
+from reliability import FastHistGradientBoostingClassifier, learn_in_rounds
 from systems import Car, Problem
 
-N_PLANS, N_TESTS = (1000, 300, 300), 20  # plans in each round of learning, problems to test on
-car, classifier, parts = Car("narrow_gate"), None, []
+N_PLANS, N_TESTS = (1000, 300), 20  # in the first round and in each later one; problems to test on
+car = Car("narrow_gate")
 
-# The first round plans without a classifier, the others with what was learned so far. They accept
-# an Unreliable move with the probability exp(-k * accuracy): wrong beliefs must come to light.
-for number, n_plans in enumerate(N_PLANS):
-    explorer = BiasedRRTConnect(car, classifier, k=6, accuracy=0.9, transitions_per_edge=1)
-    data = collect_transitions(car, explorer, n_plans, n_jobs=2, random_state=number)
-    # Once a plan has gone wrong, all that follows is Unreliable and teaches nothing.
-    parts.append(data[(data.y == 1) | data.divergence_onsets()])
-    seen = Transitions.concatenate(parts)
-    classifier = FastHistGradientBoostingClassifier(max_iter=60, class_weight="balanced")
-    classifier.fit(seen.features(car), seen.y)
-    print(f"round {number + 1}: {len(seen)} transitions to learn from")
+# The first round plans without a classifier, the others with what was learned so far. They also
+# accept some moves that are believed Unreliable, since wrong beliefs must come to light.
+learned = learn_in_rounds(
+    FastHistGradientBoostingClassifier(max_iter=60, class_weight="balanced"),
+    BiasedRRTConnect(car, k=np.inf, accuracy=0.9, transitions_per_edge=1),
+    car,
+    n_rounds=3,
+    n_plans=N_PLANS,
+    labels="plan",
+    n_jobs=2,
+    random_state=0,
+)
+classifier = learned.estimator
+print(learned)
 
 
 def drive(estimator, problem):

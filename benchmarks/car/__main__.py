@@ -72,9 +72,9 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def learned(options: argparse.Namespace) -> Any:
-    """Learn in rounds; return the classifier of the best."""
+    """Learn in rounds."""
     path = options.out / "rounds"
-    return learn(options.rounds, options.plans, options.validation, options.jobs, path).estimator
+    return learn(options.rounds, options.plans, options.validation, options.jobs, path)
 
 
 def experiment(
