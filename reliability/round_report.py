@@ -36,7 +36,7 @@ class RoundReport:
         that of the round before and ``exploring_k``.
     n_validation, n_validation_succeeded : int
         Problems that are the same for all rounds and that nothing is learned from; those at which
-        plans with the new estimator, made as the planner is, succeeded in the same sense.
+        plans with the new estimator, made by the planner with its own ``k``, succeeded likewise.
     n_transitions : int
         Transitions of the round, all of them.
     n_learned : int
