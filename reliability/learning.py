@@ -129,8 +129,8 @@ def learn_in_rounds(
         ``k`` of the planner from round 1 on. Not infinite, so that plans also go where the
         estimator is wrong, and the next round finds out.
     n_after : int, default=1
-        How many of the Unreliable transitions that end a plan to learn from, where labels are of
-        "plan": see :meth:`Transitions.trim_unreliable_tail`.
+        How many of a plan's Unreliable transitions in a row to learn from, where labels are of
+        "plan": see :meth:`Transitions.trim_unreliable_runs`.
     on_error : {"raise", "skip"}, default="raise"
         As in :func:`collect_transitions`. A plan that is left out has not succeeded.
     path : path-like, default=None

@@ -171,7 +171,7 @@ class Recipe:
             folder,
         )
         transitions = self._transitions(items, done, folder.verbose)
-        rows = transitions.trim_unreliable_tail(self.n_after)
+        rows = transitions.trim_unreliable_runs(self.n_after)
         of_round = LabelledPlans(rows.features(self.system), rows.y, rows.plan)
         data = _stacked([*(one.rows for one in done), of_round])
         task = FitTask(self.estimator, data, for_fit, folder.n_jobs)

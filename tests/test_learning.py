@@ -432,7 +432,7 @@ def test_whole_plans_are_passed_on_where_fit_takes_them(in_pipeline):
     estimator = make_pipeline(StandardScaler(), Told()) if in_pipeline else Told()
     result = learn(estimator, n_rounds=2, labels="both")
     last = result.estimator[-1] if in_pipeline else result.estimator
-    rows = result.transitions.trim_unreliable_tail(1)
+    rows = result.transitions.trim_unreliable_runs(1)
     np.testing.assert_array_equal(last.groups_, rows.plan)
     assert result.estimator.validation_accuracy_ > 0.5
     assert not hasattr(estimator, "validation_accuracy_"), "the template stays as it is"
@@ -462,7 +462,7 @@ def disc_of(random_state):
 
 def test_only_the_first_mistakes_that_end_a_plan_are_learned():
     result = learn(n_rounds=1, labels="plan", n_after=2)
-    trimmed = result.transitions.trim_unreliable_tail(2)
+    trimmed = result.transitions.trim_unreliable_runs(2)
     assert result.rounds[0].n_learned == len(trimmed) < len(result.transitions)
     expected = clone(TREE).set_params(random_state=result.estimator.random_state)
     expected.fit(trimmed.features(Disc()), trimmed.y)

@@ -61,7 +61,7 @@ def learn(n_rounds: int, n_plans: int, n_validation: int, n_jobs: int, path: Pat
     )
     # In the rounds, one that is so careful would find no plans to learn from.
     careful = clone(classifier).set_params(class_weight=CAREFUL)
-    rows = result.transitions[result.round <= result.kept_round].trim_unreliable_tail(N_AFTER)
+    rows = result.transitions[result.round <= result.kept_round].trim_unreliable_runs(N_AFTER)
     return careful.fit(rows.features(training_car), rows.y, rows.plan)
 
 

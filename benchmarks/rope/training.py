@@ -149,7 +149,7 @@ def train_ours(folder: Path, n_plans: int, n_jobs: int) -> Any:
         random_state=RANDOM_SCENE_SEED,
         verbose=1,
     )
-    learned = result.transitions[result.round <= result.kept_round].trim_unreliable_tail(N_AFTER)
+    learned = result.transitions[result.round <= result.kept_round].trim_unreliable_runs(N_AFTER)
     classifier = result.estimator.as_boosting()
     classifier.provenance_ = provenance(
         "clearance", learned, by_plan=classifier.validation_accuracy_
