@@ -16,17 +16,11 @@ car = Car("narrow_gate")
 
 # The first round plans without a classifier, the others with what was learned so far. They also
 # accept some moves that are believed Unreliable, since wrong beliefs must come to light.
+classifier = FastHistGradientBoostingClassifier(max_iter=60, class_weight="balanced")
+planner = BiasedRRTConnect(car, k=np.inf, accuracy=0.9, transitions_per_edge=1)
 learned = learn_in_rounds(
-    FastHistGradientBoostingClassifier(max_iter=60, class_weight="balanced"),
-    BiasedRRTConnect(car, k=np.inf, accuracy=0.9, transitions_per_edge=1),
-    car,
-    n_rounds=3,
-    n_plans=N_PLANS,
-    labels="plan",
-    n_jobs=2,
-    random_state=0,
+    classifier, planner, car, n_rounds=3, n_plans=N_PLANS, labels="plan", n_jobs=2, random_state=0
 )
-classifier = learned.estimator
 print(learned)
 
 
@@ -46,7 +40,7 @@ tests = [car.sample_problem(1000 + i) for i in range(N_TESTS)]
 # The start is x, y, heading, speed and steering angle; the goal is a pose.
 shown = Problem(np.array([0.8, 2.0, 1.57, 0, 0]), np.array([[7.2, 1.2, -1.57]]))
 figure, axes = plt.subplots(1, 2, figsize=(9.5, 4.4), layout="constrained")
-for axis, name, estimator in zip(axes, ("Without", "With"), (None, classifier), strict=True):
+for axis, name, estimator in zip(axes, ("Without", "With"), (None, learned.estimator), strict=True):
     n_arrived = sum(drive(estimator, test)[2] == "arrives" for test in tests)
     print(f"{name} the classifier the car arrives in {n_arrived} of {N_TESTS} test problems.")
     planned, driven, outcome = drive(estimator, shown)
