@@ -8,23 +8,20 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from planners import BiasedRRTConnect, best_of_restarts
-from reliability import FastHistGradientBoostingClassifier, Transitions, collect_transitions
+from reliability import FastHistGradientBoostingClassifier, learn_in_rounds
 from systems import Car, Problem
 
-N_PLANS, N_TESTS = (1000, 300, 300), 20  # plans in each round of learning, problems to test on
-car, classifier, parts = Car("narrow_gate"), None, []
+N_PLANS, N_TESTS = (1000, 300), 20  # in the first round and in each later one; problems to test on
+car = Car("narrow_gate")
 
-# The first round plans without a classifier, the others with what was learned so far. They accept
-# an Unreliable move with the probability exp(-k * accuracy): wrong beliefs must come to light.
-for number, n_plans in enumerate(N_PLANS):
-    explorer = BiasedRRTConnect(car, classifier, k=6, accuracy=0.9, transitions_per_edge=1)
-    data = collect_transitions(car, explorer, n_plans, n_jobs=2, random_state=number)
-    # Once a plan has gone wrong, all that follows is Unreliable and teaches nothing.
-    parts.append(data[(data.y == 1) | data.divergence_onsets()])
-    seen = Transitions.concatenate(parts)
-    classifier = FastHistGradientBoostingClassifier(max_iter=60, class_weight="balanced")
-    classifier.fit(seen.features(car), seen.y)
-    print(f"round {number + 1}: {len(seen)} transitions to learn from")
+# The first round plans without a classifier, the others with what was learned so far. They also
+# accept some moves that are believed Unreliable, since wrong beliefs must come to light.
+classifier = FastHistGradientBoostingClassifier(max_iter=60, class_weight="balanced")
+planner = BiasedRRTConnect(car, k=np.inf, accuracy=0.9, transitions_per_edge=1)
+learned = learn_in_rounds(
+    classifier, planner, car, n_rounds=3, n_plans=N_PLANS, labels="plan", n_jobs=2, random_state=0
+)
+print(learned)
 
 
 def drive(estimator, problem):
@@ -43,7 +40,7 @@ tests = [car.sample_problem(1000 + i) for i in range(N_TESTS)]
 # The start is x, y, heading, speed and steering angle; the goal is a pose.
 shown = Problem(np.array([0.8, 2.0, 1.57, 0, 0]), np.array([[7.2, 1.2, -1.57]]))
 figure, axes = plt.subplots(1, 2, figsize=(9.5, 4.4), layout="constrained")
-for axis, name, estimator in zip(axes, ("Without", "With"), (None, classifier), strict=True):
+for axis, name, estimator in zip(axes, ("Without", "With"), (None, learned.estimator), strict=True):
     n_arrived = sum(drive(estimator, test)[2] == "arrives" for test in tests)
     print(f"{name} the classifier the car arrives in {n_arrived} of {N_TESTS} test problems.")
     planned, driven, outcome = drive(estimator, shown)

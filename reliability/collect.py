@@ -27,7 +27,7 @@ from reliability.transitions import Transitions, join
 from systems.validation import RandomState, as_seed, check_count
 
 _KIND = "transitions of executed plans, one plan in each file"
-_ON_ERROR = ("raise", "skip")
+ON_ERROR = ("raise", "skip")
 _MOST_TOLD = 10
 
 
@@ -137,7 +137,7 @@ def execute_plans(
     """
     check_count(n_plans, "n_plans")
     check_choice(labels, "labels", LABELS)
-    check_choice(on_error, "on_error", _ON_ERROR)
+    check_choice(on_error, "on_error", ON_ERROR)
     family = SceneFamily(system)
     family.check_planner(planner)
     seed, store = as_seed(random_state), None

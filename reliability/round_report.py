@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import fisher_exact, ttest_1samp
+from scipy.stats import binomtest, ttest_1samp
 
 from reliability.item_files import Item
 from reliability.plan_execution import DIVERGED, EXECUTED
@@ -32,7 +32,11 @@ class RoundReport:
         From 0.
     n_plans, n_solved, n_succeeded : int
         Problems of the round; those that were solved; those whose execution also came to its end,
-        Close to where the plan ends.
+        Close to where the plan ends. Plans of round 0 are made without an estimator, others with
+        that of the round before and ``exploring_k``.
+    n_validation, n_validation_succeeded : int
+        Problems that are the same for all rounds and that nothing is learned from; those at which
+        plans with the new estimator, made by the planner with its own ``k``, succeeded likewise.
     n_transitions : int
         Transitions of the round, all of them.
     n_learned : int
@@ -52,8 +56,9 @@ class RoundReport:
     p_acc : float
         The new estimator's ``validation_accuracy_``.
     success_improved : bool or None
-        Whether more of the round's plans succeeded than of the round before, beyond chance
-        (Fisher's exact test at 5 %). None in round 0.
+        Whether plans with the new estimator succeeded at more validation problems than plans with
+        the estimator before, beyond chance (sign test at 5 % over the problems at which only one
+        of both succeeded). None in round 0.
     accuracy_improved : bool or None
         Whether ``updated_balanced_accuracy`` is above ``unseen_balanced_accuracy``, beyond chance
         (t-test over plans at 5 %). As the plans show above all where the earlier estimator is
@@ -66,6 +71,8 @@ class RoundReport:
     n_plans: int
     n_solved: int
     n_succeeded: int
+    n_validation: int
+    n_validation_succeeded: int
     n_transitions: int
     n_learned: int
     base_rate: float
@@ -79,16 +86,18 @@ class RoundReport:
 
     @property
     def brought_nothing(self) -> bool:
-        """Whether neither success nor balanced accuracy rose beyond chance; not of round 0."""
+        """Whether neither successes nor balanced accuracy rose beyond chance; not of round 0."""
         return self.round > 0 and not (self.success_improved or self.accuracy_improved)
 
     def __str__(self) -> str:
-        """Return the numbers in three lines."""
+        """Return the numbers in four lines."""
         return (
             f"Round {self.round}: {self.n_solved} of {self.n_plans} problems solved, "
-            f"{self.n_succeeded} succeeded{_told(self.success_improved)}; "
+            f"{self.n_succeeded} succeeded; "
             f"{self.n_transitions:,} transitions, {self.n_learned:,} to learn from so far; "
             f"{self.seconds:.0f} s.\n"
+            f"  With the new estimator, plans succeeded at {self.n_validation_succeeded} of "
+            f"{self.n_validation} validation problems{_told(self.success_improved)}.\n"
             f"  Balanced accuracy on its plans: {self.unseen_balanced_accuracy:.3f} before, "
             f"{self.updated_balanced_accuracy:.3f} with what they taught"
             f"{_told(self.accuracy_improved)}; base rate {self.base_rate:.3f}.\n"
@@ -109,13 +118,22 @@ class PlanCounts:
     def of(cls, items: Sequence[Item]) -> PlanCounts:
         """Count what became of plans."""
         outcomes = Counter(item.facts["outcome"] for item in items)
-        n_succeeded = sum(bool(item.facts.get("succeeded")) for item in items)
-        return cls(len(items), outcomes[EXECUTED] + outcomes[DIVERGED], n_succeeded)
+        n_solved = outcomes[EXECUTED] + outcomes[DIVERGED]
+        return cls(len(items), n_solved, int(succeeded_plans(items).sum()))
 
-    def more_succeeded_than(self, before: PlanCounts) -> bool:
-        """Say whether the share of successes is greater than before, beyond chance."""
-        table = [[one.n_succeeded, one.n_plans - one.n_succeeded] for one in (self, before)]
-        return bool(fisher_exact(table, alternative="greater").pvalue < SIGNIFICANCE)
+
+def succeeded_plans(items: Sequence[Item]) -> NDArray[np.bool_]:
+    """Say which plans were executed with success, shape (n,)."""
+    return np.array([bool(item.facts.get("succeeded")) for item in items])
+
+
+def more_succeed(succeeded: NDArray[np.bool_], before: NDArray[np.bool_]) -> bool:
+    """Say whether plans succeed at more of the same problems than before, beyond chance."""
+    only_now, only_before = int((succeeded & ~before).sum()), int((before & ~succeeded).sum())
+    if not only_now:
+        return False
+    test = binomtest(only_now, only_now + only_before, alternative="greater")
+    return bool(test.pvalue < SIGNIFICANCE)
 
 
 def is_better(

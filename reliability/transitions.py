@@ -160,29 +160,29 @@ class Transitions:
             f"reduced_dim {dim}, command_dim {self.command.shape[1]}>"
         )
 
-    def trim_unreliable_tail(self, n_after: int) -> Transitions:
-        """Leave out what each plan did long after its execution had diverged for good.
+    def trim_unreliable_runs(self, n_after: int) -> Transitions:
+        """Leave out what each plan did long after its execution had diverged.
 
-        Once an execution has diverged and does not come back, all that follows is Unreliable by
-        Eq. 3, whatever it is. Such rows tell where executions are that diverged earlier, and
-        not what makes them diverge. Rows that are labelled from executed states are all kept.
+        Once an execution has diverged, all that follows is Unreliable by Eq. 3, whatever it is,
+        until the system happens to be where the plan has it again. Such rows tell where executions
+        are that diverged earlier, and not what makes them diverge. Rows that are labelled from
+        executed states are all kept.
 
         Parameters
         ----------
         n_after : int
-            How many of the Unreliable transitions that end a plan to keep, the first ones.
+            How many of each plan's Unreliable transitions in a row to keep, the first ones. With
+            1, what is kept is what is Reliable and :meth:`divergence_onsets`.
 
         Returns
         -------
         transitions : Transitions
         """
         check_count(n_after, "n_after")
-        _, plan = np.unique(self.plan, return_inverse=True)
-        last = np.full(plan.max(initial=-1) + 1, -1)
-        planned = ~self.executed
-        reliable = planned & (self.y == RELIABLE)
-        np.maximum.at(last, plan[planned], np.where(reliable, self.step, -1)[planned])
-        return self[self.executed | (self.step <= last[plan] + n_after)]
+        begins = np.flatnonzero((self.y == RELIABLE) | self.divergence_onsets())
+        rows = np.arange(len(self))
+        n_before = rows - begins[np.searchsorted(begins, rows, side="right") - 1]
+        return self[n_before < n_after]
 
     @classmethod
     def concatenate(cls, parts: Sequence[Transitions]) -> Transitions:

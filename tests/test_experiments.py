@@ -46,7 +46,8 @@ def test_arm_example_gives_its_table_and_pictures(tmp_path):
 
 def test_car_example_gives_its_tables_and_pictures(tmp_path):
     out = tmp_path / "out"
-    size = ("--scenes", 3, "--plans", 5, "--rounds", 2, "--test-scenes", 1, "--queries", 1)
+    learning = ("--plans", 15, "--validation", 2, "--rounds", 2)
+    size = (*learning, "--scenes", 3, "--test-scenes", 1, "--queries", 1)
     shown = run("-m", "benchmarks.car", *size, "--jobs", 1, "--out", out, cwd=tmp_path)
     assert "Round 1:" in shown
     assert "Best accuracy that any classifier of b, u and E can have here" in shown

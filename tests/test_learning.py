@@ -21,6 +21,7 @@ from planners import BiasedRRTConnect, PlanStatus
 from reliability import (
     RELIABLE,
     UNRELIABLE,
+    PlanFailedError,
     ResumableStore,
     StoreError,
     TransitionReliabilityClassifier,
@@ -28,14 +29,15 @@ from reliability import (
     learn_in_rounds,
 )
 
-N_PLANS, K, SEED = 25, 3.0, 2
+N_PLANS, N_VALIDATION, K, SEED = 25, 10, 3.0, 2
 # One that looks at a feature at random in each split learns from each of three rounds.
 TREE = DecisionTreeClassifier(max_depth=4, max_features=1)
 
 
-def learn(estimator=TREE, system=None, **parameters):
-    planner = BiasedRRTConnect(None, max_iterations=300)
-    defaults = {"n_rounds": 3, "n_plans": N_PLANS, "exploring_k": K, "random_state": SEED}
+def learn(estimator=TREE, system=None, k=1.0, **parameters):
+    planner = BiasedRRTConnect(None, k=k, max_iterations=300)
+    defaults = {"n_rounds": 3, "n_plans": N_PLANS, "n_validation": N_VALIDATION}
+    defaults |= {"exploring_k": K, "random_state": SEED}
     return learn_in_rounds(estimator, planner, system or Disc(), **defaults | parameters)
 
 
@@ -67,6 +69,7 @@ def assert_alike(result, expected):
         result.estimator.predict_proba(X), expected.estimator.predict_proba(X)
     )
     assert result.stopped_early == expected.stopped_early
+    assert result.kept_round == expected.kept_round
 
 
 def test_rounds_are_apart_and_known(whole):
@@ -112,10 +115,9 @@ def test_reports_are_those_of_plain_references(whole):
         _, _, _, right = cross_validated(whole, report.round)
         p_value = p_value_of_plans(right, guessed == rows.y, rows)
         assert report.accuracy_improved == (p_value < 0.05)
-        p_value = p_value_of_successes(report, whole.rounds[report.round - 1])
-        assert report.success_improved == (p_value < 0.05)
     assert any(report.accuracy_improved for report in whole.rounds)
-    assert whole.estimator.validation_accuracy_ == whole.rounds[-1].p_acc
+    kept = whole.rounds[whole.kept_round]
+    assert whole.estimator.validation_accuracy_ == kept.p_acc
 
 
 def cross_validated(whole, number):
@@ -150,38 +152,98 @@ def p_value_of_plans(right, right_before, rows):
     return scipy.stats.t.sf(t, len(shares) - 1)
 
 
-def p_value_of_successes(report, before):
-    """Count, among all ways to deal the successes out, those with at least as many in the last."""
-    n, n_before, total = report.n_plans, before.n_plans, report.n_succeeded + before.n_succeeded
-    at_least = range(report.n_succeeded, min(n, total) + 1)
-    ways = sum(comb(n, i) * comb(n_before, total - i) for i in at_least)
-    return ways / comb(n + n_before, total)
-
-
 def fit_seed(number):
     drawn = np.random.SeedSequence(SEED, spawn_key=(number, 0, 0)).generate_state(2, np.uint64)
     return int(drawn[1]) >> 1
 
 
-def test_successes_are_counted_as_one_would(monkeypatch):
-    plans, plan = [], BiasedRRTConnect.plan
+@pytest.fixture
+def plans(monkeypatch):
+    """Problems, results and planners of all plans that are made."""
+    made, plan = [], BiasedRRTConnect.plan
 
     def recorded(planner, start_reduced, goal):
-        plans.append(plan(planner, start_reduced, goal))
-        return plans[-1]
+        made.append((start_reduced, plan(planner, start_reduced, goal), planner))
+        return made[-1][1]
 
     monkeypatch.setattr(BiasedRRTConnect, "plan", recorded)
-    (report,) = learn(n_rounds=1).rounds
-    solved = [one for one in plans if one.success]
-    assert (report.n_plans, report.n_solved) == (len(plans), len(solved))
+    return made
+
+
+def n_succeeded(results):
+    solved = [one for one in results if one.success]
     rollouts = [Disc().rollout(one.reduced[0], one.commands) for one in solved]
-    expected = sum(
+    return sum(
         rollout.n_completed == len(plan.commands)
         and np.linalg.norm(rollout.states[-1] - plan.reduced[-1]) < 0.04
         for rollout, plan in zip(rollouts, solved, strict=True)
     )
-    assert 0 < expected < len(solved)
-    assert report.n_succeeded == expected
+
+
+def test_successes_are_counted_as_one_would(plans):
+    (report,) = learn(n_rounds=1).rounds
+    of_round, of_validation = (
+        [result for _, result, planner in plans if (planner.estimator is None) == is_round]
+        for is_round in (True, False)
+    )
+    assert (report.n_plans, report.n_validation) == (len(of_round), len(of_validation))
+    assert report.n_solved == sum(result.success for result in of_round)
+    assert 0 < report.n_succeeded < report.n_solved
+    assert report.n_succeeded == n_succeeded(of_round)
+    assert report.n_validation_succeeded == n_succeeded(of_validation)
+
+
+def test_all_estimators_are_compared_on_problems_that_nothing_is_learned_from(plans):
+    result = learn(n_rounds=2)
+    made = [plans[N_PLANS : N_PLANS + N_VALIDATION], plans[-N_VALIDATION:]]
+    starts = [np.array([start for start, _, _ in of_round]) for of_round in made]
+    np.testing.assert_array_equal(*starts)
+    assert len(np.unique(starts[0], axis=0)) == N_VALIDATION
+    assert not np.isin(starts[0][:, 0], result.transitions.reduced[:, 0]).any()
+    assert {planner.k for of_round in made for _, _, planner in of_round} == {1.0}
+    first, second = ({id(planner.estimator) for _, _, planner in one} for one in made)
+    assert len(first) == len(second) == 1
+    assert first != second
+
+
+class Spoiled(ClassifierMixin, BaseEstimator):
+    """A tree, until it learns from many rows: then all is ``answer``."""
+
+    def __init__(self, n_rows, answer):
+        self.n_rows, self.answer = n_rows, answer
+
+    def fit(self, X, y):
+        self.tree_ = DecisionTreeClassifier(max_depth=4, random_state=0).fit(X, y)
+        self.classes_, self.n_learned_ = np.unique(y), len(X)
+        return self
+
+    def predict(self, X):
+        return (
+            self.tree_.predict(X) if self.n_learned_ < self.n_rows else np.full(len(X), self.answer)
+        )
+
+
+def test_a_round_that_made_the_estimator_worse_is_not_kept(tmp_path):
+    n_rows = learn(n_rounds=1).rounds[0].n_learned
+    estimator = Spoiled(n_rows + 1, UNRELIABLE)
+    result = learn(estimator, k=np.inf, n_rounds=2, path=tmp_path)
+    first, second = (report.n_validation_succeeded for report in result.rounds)
+    assert first > second == 0
+    assert result.kept_round == 0
+    assert result.estimator.n_learned_ == n_rows
+    assert not result.rounds[1].success_improved
+    assert len(result.transitions) > n_rows, "what was collected is not thrown away"
+    assert "Kept: the estimator of round 0." in str(result)
+    assert f"succeeded at {first}, 0 of {N_VALIDATION} validation problems" in str(result)
+    again = learn(estimator, k=np.inf, n_rounds=2, path=tmp_path)
+    assert again.kept_round == 0, "read from its folder"
+
+
+def test_of_equally_good_estimators_the_one_that_learned_from_more_is_kept():
+    result = learn(Spoiled(10**6, UNRELIABLE), system=Disc(sticky=True), n_rounds=2, n_validation=1)
+    counts = [report.n_validation_succeeded for report in result.rounds]
+    assert counts[0] == counts[1]
+    assert result.kept_round == 1
 
 
 def interrupt(patch, owner, name, n_before):
@@ -205,8 +267,9 @@ def interrupt(patch, owner, name, n_before):
         (DecisionTreeClassifier, "fit", 5),
         (BiasedRRTConnect, "plan", N_PLANS + 3),
         (DecisionTreeClassifier, "fit", 6),
-        (BiasedRRTConnect, "plan", 3 * N_PLANS - 1),
+        (BiasedRRTConnect, "plan", N_PLANS + N_VALIDATION + 1),
         (DecisionTreeClassifier, "fit", 17),
+        (BiasedRRTConnect, "plan", 3 * (N_PLANS + N_VALIDATION) - 1),
     ],
 )
 def test_interrupted_anywhere_it_goes_on_to_the_same_bytes(
@@ -228,7 +291,7 @@ def test_a_finished_folder_is_read_and_more_rounds_extend_it(whole, folder, tmp_
     first = learn(n_rounds=1, path=tmp_path)
     assert_equal(first.transitions, whole.transitions[whole.round == 0])
     with monkeypatch.context() as patch:
-        interrupt(patch, BiasedRRTConnect, "plan", 2 * N_PLANS)
+        interrupt(patch, BiasedRRTConnect, "plan", 2 * (N_PLANS + N_VALIDATION))
         assert_alike(learn(path=tmp_path), whole)
     interrupt(monkeypatch, BiasedRRTConnect, "plan", 0)
     interrupt(monkeypatch, DecisionTreeClassifier, "fit", 0)
@@ -285,24 +348,53 @@ def test_a_round_that_brings_nothing_is_the_last():
 
 
 class GivesUp(BiasedRRTConnect):
-    """Solves few problems without an estimator."""
+    """Solves few problems with an estimator that learned from few rows."""
 
     def plan(self, start_reduced, goal):
         result = super().plan(start_reduced, goal)
-        gives_up = self.estimator is None and start_reduced[1] > -0.5
+        few = self.estimator is not None and self.estimator.n_learned_ < N_ROWS
+        gives_up = few and start_reduced[1] > -0.5
         return replace(result, status=PlanStatus.ITERATION_LIMIT) if gives_up else result
 
 
-def test_it_goes_on_as_long_as_more_plans_succeed():
+N_ROWS = 600
+
+
+def test_it_goes_on_as_long_as_more_plans_succeed(tmp_path):
     planner = GivesUp(None, max_iterations=300)
     result = learn_in_rounds(
-        Constant(RELIABLE), planner, Disc(), n_rounds=4, n_plans=50, random_state=0
+        Constant(RELIABLE),
+        planner,
+        Disc(),
+        n_rounds=4,
+        n_plans=40,
+        n_validation=20,
+        path=tmp_path,
+        random_state=0,
     )
+    n_learned = [report.n_learned for report in result.rounds]
+    assert n_learned[0] < N_ROWS < n_learned[1]
     assert [report.success_improved for report in result.rounds] == [None, True, False]
     assert [report.accuracy_improved for report in result.rounds] == [None, False, False]
-    for report, before in zip(result.rounds[1:], result.rounds[:-1], strict=True):
-        assert report.success_improved == (p_value_of_successes(report, before) < 0.05)
+    stores = [ResumableStore.at(tmp_path / f"validation-{i}") for i in range(3)]
+    outcomes = [
+        np.array([store.read(name).facts.get("succeeded", False) for name in store.names()])
+        for store in stores
+    ]
+    for number, report in enumerate(result.rounds):
+        assert report.n_validation_succeeded == outcomes[number].sum()
+        if number:
+            p_value = p_value_of_sign_test(outcomes[number], outcomes[number - 1])
+            assert report.success_improved == (p_value < 0.05)
     assert result.stopped_early
+    assert result.kept_round == 2
+
+
+def p_value_of_sign_test(succeeded, before):
+    """Sum up how probable as many or more heads are in as many tosses of a coin."""
+    n_for, n_against = np.sum(succeeded & ~before), np.sum(before & ~succeeded)
+    n = n_for + n_against
+    return sum(comb(n, i) for i in range(n_for, n + 1)) / 2**n
 
 
 def test_a_round_without_a_plan_brings_nothing():
@@ -320,7 +412,7 @@ class Constant(ClassifierMixin, BaseEstimator):
         self.answer = answer
 
     def fit(self, X, y):
-        self.classes_ = np.unique(y)
+        self.classes_, self.n_learned_ = np.unique(y), len(X)
         return self
 
     def predict(self, X):
@@ -340,7 +432,7 @@ def test_whole_plans_are_passed_on_where_fit_takes_them(in_pipeline):
     estimator = make_pipeline(StandardScaler(), Told()) if in_pipeline else Told()
     result = learn(estimator, n_rounds=2, labels="both")
     last = result.estimator[-1] if in_pipeline else result.estimator
-    rows = result.transitions.trim_unreliable_tail(1)
+    rows = result.transitions.trim_unreliable_runs(1)
     np.testing.assert_array_equal(last.groups_, rows.plan)
     assert result.estimator.validation_accuracy_ > 0.5
     assert not hasattr(estimator, "validation_accuracy_"), "the template stays as it is"
@@ -370,12 +462,48 @@ def disc_of(random_state):
 
 def test_only_the_first_mistakes_that_end_a_plan_are_learned():
     result = learn(n_rounds=1, labels="plan", n_after=2)
-    trimmed = result.transitions.trim_unreliable_tail(2)
+    trimmed = result.transitions.trim_unreliable_runs(2)
     assert result.rounds[0].n_learned == len(trimmed) < len(result.transitions)
     expected = clone(TREE).set_params(random_state=result.estimator.random_state)
     expected.fit(trimmed.features(Disc()), trimmed.y)
     X = result.transitions.features(Disc())
     np.testing.assert_array_equal(expected.predict(X), result.estimator.predict(X))
+
+
+def test_rounds_may_differ_in_how_many_plans_they_make(whole, tmp_path):
+    result = learn(n_plans=(N_PLANS, N_PLANS, 12), path=tmp_path)
+    assert [report.n_plans for report in result.rounds] == [N_PLANS, N_PLANS, 12]
+    assert_equal(result.transitions[result.round < 2], whole.transitions[whole.round < 2])
+    last = result.transitions.plan[result.round == 2]
+    assert 2 * N_PLANS <= last.min() < last.max() < 2 * N_PLANS + 12
+    with pytest.raises(StoreError, match=r"n_plans: .* then, 25 now"):
+        learn(path=tmp_path)
+
+
+def test_the_last_number_of_plans_is_that_of_all_later_rounds(whole, folder, monkeypatch):
+    interrupt(monkeypatch, BiasedRRTConnect, "plan", 0)
+    assert_alike(learn(n_plans=[N_PLANS, N_PLANS], path=folder), whole)
+
+
+class Falls(Disc):
+    """Can't be executed from some places."""
+
+    def rollout(self, state, commands):
+        if state[1] > 0.5:
+            raise RuntimeError("fell over")
+        return super().rollout(state, commands)
+
+
+def test_plans_that_fail_are_left_out_where_that_is_asked_for():
+    with pytest.raises(PlanFailedError, match="fell over"):
+        learn(system=Falls(), n_rounds=1)
+    with pytest.warns(UserWarning, match="plans failed and were left out"):
+        result = learn(system=Falls(), n_rounds=1, on_error="skip")
+    (report,) = result.rounds
+    starts = result.transitions.reduced[result.transitions.step == 0]
+    assert len(starts) == report.n_solved < report.n_plans == N_PLANS
+    assert (starts[:, 1] <= 0.5).all()
+    assert report.n_validation == N_VALIDATION
 
 
 class NoK:
@@ -390,6 +518,10 @@ class NoK:
     [
         ({"n_rounds": 0}, "n_rounds must be a positive integer, got 0"),
         ({"n_plans": 2.5}, "n_plans must be a positive integer, got 2.5"),
+        ({"n_plans": ()}, "n_plans must hold at least one number"),
+        ({"n_plans": (3, 0)}, "n_plans must be a positive integer, got 0"),
+        ({"n_validation": 0}, "n_validation must be a positive integer, got 0"),
+        ({"on_error": "ignore"}, "on_error must be one of raise, skip, got 'ignore'"),
         ({"labels": "all"}, "labels must be one of plan, executed, both, got 'all'"),
         ({"exploring_k": -1}, "exploring_k must be a number between 0 and inf, got -1"),
         ({"n_after": 0}, "n_after must be a positive integer, got 0"),

@@ -1,99 +1,120 @@
-"""The rope's random scenes: which are planned in, and that none is planned in again."""
+"""The scenes that the rope's models learn in, and that executions end where g forbids it."""
 
 import numpy as np
 import pytest
 
 from benchmarks.rope.collection import (
-    Round,
-    SceneData,
-    as_far_as_allowed,
-    collect_random_scenes,
-    described,
-    random_scene,
+    RopeWithoutSlackLimit,
+    TrainingRope,
+    TrainingScenes,
+    _HardScene,
+    of_bands,
 )
-from reliability import UNRELIABLE, Transitions
-from systems import Rope
+from benchmarks.rope.training import MirroredBoosting
+from planners import BiasedRRT
+from reliability import (
+    FastHistGradientBoostingClassifier,
+    Transitions,
+    compile_inference,
+)
+from systems import Rope, RopeStopReason, has_slot_and_slit, load_scene
 
-SLOTTED, ANY = 13_000, 13_001
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("scenes")
-
-
-@pytest.fixture(scope="module")
-def found(folder):
-    scenes = Round(range(SLOTTED, ANY + 1), biased=False, slotted=True)
-    return collect_random_scenes(folder, scenes, None, n_jobs=1)
+SLOTTED, SIMPLE_HOOK = 28, 29
 
 
 @pytest.fixture(scope="module")
-def both(found):
-    """The first plan and the others, in two scenes of different dimensions, one without plans."""
-    scene, other = found[0].scenes[0], random_scene(ANY)
-    assert scene.n_nodes != other.n_nodes
-    joined = Transitions.concatenate([part.transitions for part in found])
-    return SceneData([scene, other], joined)
+def family(tmp_path_factory):
+    return TrainingScenes(tmp_path_factory.mktemp("scenes"))
 
 
-def test_a_slotted_round_plans_only_in_scenes_with_a_slot_and_a_slit(found):
-    names = [{part.name for part in random_scene(i).obstacles} for i in (SLOTTED, ANY)]
-    assert [{"lower slotted wall", "lower wall"} <= of_scene for of_scene in names] == [True, False]
-    first, others = found
-    for part in found:
-        (scene,) = part.scenes
-        np.testing.assert_array_equal(scene.packed, random_scene(SLOTTED).packed)
-    assert first.transitions.y[-1] == UNRELIABLE, "hard: the first plan goes wrong"
-    assert len(np.unique(first.transitions.plan)) == 1
-    assert 1 <= len(np.unique(others.transitions.plan)) <= 2
+@pytest.fixture(scope="module")
+def rope(family):
+    return family(SLOTTED)
 
 
-def test_what_is_there_is_not_collected_again(found, folder):
-    made = {file: file.stat().st_mtime_ns for file in folder.rglob("*.item")}
-    assert len(made) == 3
-    scenes = Round(range(SLOTTED, SLOTTED + 1), biased=False, slotted=True)
-    again = collect_random_scenes(folder, scenes, None, n_jobs=1)
-    assert {file: file.stat().st_mtime_ns for file in folder.rglob("*.item")} == made
-    for one, other in zip(again, found, strict=True):
-        np.testing.assert_array_equal(one.transitions.y, other.transitions.y)
+def plan_through_mistakes(rope, seed=0):
+    problem = rope.sample_problem(seed)
+    planner = BiasedRRT(rope, max_iterations=4000, random_state=seed)
+    return problem, planner.plan(rope.reduce(problem.start), problem.goal)
 
 
-def test_a_round_without_a_hard_scene_gives_nothing(tmp_path):
-    assert collect_random_scenes(tmp_path, Round(range(ANY, ANY + 1), False, True), None, 1) == []
+def test_half_of_the_scenes_are_simple_hook_from_starts_that_are_drawn(family):
+    rope = family(SIMPLE_HOOK)
+    np.testing.assert_array_equal(rope.scene.packed, load_scene("simple_hook").packed)
+    starts = [rope.reduce(rope.sample_problem(seed).start) for seed in range(2)]
+    assert not np.array_equal(*starts)
 
 
-def test_plans_are_cut_where_g_does_not_allow_them(both):
-    data, kept = both.transitions, as_far_as_allowed(both).transitions
-    rope = Rope(both.scenes[0], features="clearance")
-    _, valid = rope.propagate(data.reduced, data.command)
-    assert not valid.all(), "where the plan goes wrong a PBD rope is overstretched"
-    assert rope.propagate(kept.reduced, kept.command)[1].all()
-    for plan in np.unique(data.plan):
-        n = np.argmin(np.append(valid[data.plan == plan], False))
-        np.testing.assert_array_equal(
-            kept.step[kept.plan == plan], data.step[data.plan == plan][:n]
-        )
-    none = SceneData(both.scenes, data[:0])
-    assert len(as_far_as_allowed(none).transitions) == 0
+def test_the_others_are_random_and_hard_and_half_of_those_have_a_slot_and_a_slit(rope):
+    assert has_slot_and_slit(rope.scene)
+    starts = [rope.reduce(rope.sample_problem(seed).start) for seed in range(2)]
+    np.testing.assert_array_equal(*starts)
+    np.testing.assert_array_equal(starts[0], rope.reduce(rope.scene_problem().start))
+    problem, plan = plan_through_mistakes(rope)
+    rollout = rope.rollout(problem.start, plan.commands)
+    completed = rollout.n_completed == len(plan.commands)
+    end = rope.reduce(rollout.states[-1])[None]
+    assert not (completed and rope.close(plan.reduced[-1:], end)[0])
 
 
-def test_plans_stay_apart_and_scenes_are_known_across_parts(found, both):
-    first, others = found
-    rows, labels, plans, scenes = described([first, others, both], "clearance")
-    n = len(first.transitions) + len(others.transitions)
-    assert len(rows) == len(labels) == len(plans) == len(scenes) == 2 * n
-    assert not set(plans[:n]) & set(plans[n:])
-    assert set(scenes[: len(first.transitions)]) == {0}
-    np.testing.assert_array_equal(scenes[n:], 0)
-    np.testing.assert_array_equal(rows[:n], rows[n:])
+def test_a_scene_that_was_looked_for_is_not_looked_for_again(family, rope, monkeypatch):
+    monkeypatch.setattr(_HardScene, "__call__", None)
+    again = TrainingScenes(family.folder)(SLOTTED)
+    np.testing.assert_array_equal(again.scene.packed, rope.scene.packed)
 
 
-def test_other_features_see_the_bands_alone(found):
-    rows, labels, _, _ = described(found[:1], "vector")
-    data = found[0].transitions
-    scene = found[0].scenes[0]
-    carrying, band = Rope(scene, features="clearance"), Rope(scene, features="vector")
-    expected = band.features(carrying.bands(data.reduced), carrying.bands(data.next_reduced))
-    np.testing.assert_array_equal(rows, expected)
-    np.testing.assert_array_equal(labels, data.y)
+def test_executions_end_where_the_ropes_own_g_forbids_it(rope):
+    problem, plan = plan_through_mistakes(rope)
+    own, lax = Rope(rope.scene, features="clearance"), RopeWithoutSlackLimit(rope.scene)
+    allowed = own.propagate(plan.reduced[:-1], plan.commands)[1]
+    n_allowed = int(np.argmin(np.append(allowed, False)))
+    rollout = rope.rollout(problem.start, plan.commands)
+    whole = lax.rollout(problem.start, plan.commands)
+    assert 0 < n_allowed < len(plan.commands), "the plan overstretches a PBD rope"
+    n_states = 1 + min(n_allowed, len(whole.states) - 1)
+    assert len(rollout.states) == n_states
+    np.testing.assert_array_equal(rollout.states[-1].nodes, whole.states[n_states - 1].nodes)
+    if whole.n_completed >= n_allowed:
+        assert rollout.n_completed == n_allowed
+        assert rollout.stop_reason is RopeStopReason.OVERSTRETCHED
+
+
+def test_a_plan_that_g_allows_is_executed_as_it_is():
+    scene = load_scene("simple_hook")
+    rope = TrainingRope(scene, from_scene_start=False)
+    problem = rope.sample_problem(0)
+    commands = np.tile([0.0, 0.0, 0.01, 0.0, 0.0, 0.01], (3, 1))
+    rollouts = [one.rollout(problem.start, commands) for one in (rope, Rope(scene))]
+    assert rollouts[0].n_completed == len(commands)
+    assert rollouts[0].stop_reason is rollouts[1].stop_reason
+    np.testing.assert_array_equal(*[one.states[-1].nodes for one in rollouts])
+
+
+def test_bands_alone_are_what_other_features_see():
+    rope = RopeWithoutSlackLimit(load_scene("simple_hook"))
+    reduced = rope.reduce(rope.sample_problem(0).start)[None]
+    command = np.array([[0.0, 0.0, 0.01, 0.0, 0.0, 0.01]])
+    following = rope.propagate(reduced, command)[0]
+    bands = of_bands(Transitions(reduced, command, following, [1], [7], [3]))
+    vector = Rope("simple_hook", features="vector")
+    expected = vector.features(rope.bands(reduced), rope.bands(following))
+    np.testing.assert_array_equal(bands.features(vector), expected)
+    assert (bands.y, bands.plan, bands.step) == (1, 7, 3)
+
+
+def test_mirrored_boosting_becomes_a_classifier_that_files_can_hold():
+    rng = np.random.default_rng(0)
+    X = rng.normal(size=(400, 496)).astype(np.float32)
+    y = (X[:, 0] > 1).astype(int)
+    fitted = MirroredBoosting(max_iter=5, early_stopping=False, random_state=0).fit(X, y)
+    plain = fitted.as_boosting()
+    assert type(plain) is FastHistGradientBoostingClassifier
+    np.testing.assert_array_equal(plain.predict_proba(X), fitted.predict_proba(X))
+    assert compile_inference(fitted) is not None, "planners ask it as quickly"
+
+
+def test_both_labels_weigh_the_same_however_rare_one_is():
+    X = np.zeros((1000, 496), dtype=np.float32)
+    y = (np.arange(1000) < 50).astype(int)
+    fitted = MirroredBoosting(max_iter=5, early_stopping=False, random_state=0).fit(X, y)
+    np.testing.assert_allclose(fitted.predict_proba(X[:1]), 0.5, atol=0.05)

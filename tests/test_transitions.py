@@ -264,16 +264,12 @@ def test_divergence_onsets_follow_reliable_transitions_of_the_same_plan():
     assert mixed.divergence_onsets().all(), "neither follows a transition of its own kind"
 
 
-def test_a_tail_labelled_from_executed_states_is_kept():
+def test_rows_labelled_from_executed_states_are_kept():
     zeros, y = np.zeros((8, 1)), np.array([1, 0, 0, 0, 1, 0, 0, 0])
     executed = np.repeat([False, True], 4)
     data = Transitions(zeros, zeros, zeros, y, 0 * y, np.tile(np.arange(4), 2), None, executed)
-    kept = data.trim_unreliable_tail(1)
+    kept = data.trim_unreliable_runs(1)
     assert kept.step.tolist() == [0, 1, 0, 1, 2, 3]
-    swapped = Transitions(
-        zeros, zeros, zeros, np.array([1, 0, 0, 0, 1, 0, 0, 1]), 0 * y, data.step, None, executed
-    )
-    assert len(swapped.trim_unreliable_tail(1)) == 6, "what was executed saves no plan's tail"
 
 
 @pytest.mark.parametrize("kept", [0, 10, 500, -40])
@@ -424,18 +420,19 @@ def test_labels_are_one_and_zero():
     assert (RELIABLE, UNRELIABLE) == (1, 0)
 
 
-def test_what_plans_did_long_after_they_diverged_for_good_is_left_out():
-    y = np.array([1, 0, 1, 0, 0, 0, 1, 1, 0, 0, 0, 0])
-    plan = np.array([7, 7, 7, 7, 7, 7, 3, 5, 5, 5, 2, 2])
-    step = np.array([0, 1, 2, 3, 4, 5, 0, 0, 1, 2, 0, 1])
-    order = np.random.default_rng(0).permutation(len(y))
-    rows = np.arange(12.0)[order, None]
-    data = Transitions(rows, rows, rows, y[order], plan[order], step[order])
-    for n_after, left_out in ((1, [4, 5, 9, 11]), (2, [5])):
-        kept = data.trim_unreliable_tail(n_after).reduced[:, 0]
-        np.testing.assert_array_equal(np.sort(kept), np.delete(np.arange(12), left_out))
+def test_what_plans_did_long_after_they_diverged_is_left_out():
+    y = np.array([1, 0, 0, 1, 0, 0, 0, 1, 1, 0, 0, 0, 0])
+    plan = np.array([7, 7, 7, 7, 7, 7, 7, 3, 5, 5, 5, 2, 2])
+    step = np.array([0, 1, 2, 3, 4, 5, 6, 0, 0, 1, 2, 0, 1])
+    rows = np.arange(13.0)[:, None]
+    data = Transitions(rows, rows, rows, y, plan, step)
+    for n_after, left_out in ((1, [2, 5, 6, 10, 12]), (2, [6])):
+        kept = data.trim_unreliable_runs(n_after)
+        np.testing.assert_array_equal(kept.reduced[:, 0], np.delete(np.arange(13), left_out))
+    onsets = data[(data.y == RELIABLE) | data.divergence_onsets()]
+    assert_equal(data.trim_unreliable_runs(1), onsets)
     all_reliable = data[data.y == RELIABLE]
-    assert len(all_reliable.trim_unreliable_tail(1)) == len(all_reliable)
-    assert len(data[:0].trim_unreliable_tail(1)) == 0
+    assert len(all_reliable.trim_unreliable_runs(1)) == len(all_reliable)
+    assert len(data[:0].trim_unreliable_runs(1)) == 0
     with pytest.raises(ValueError, match="n_after must be"):
-        data.trim_unreliable_tail(0)
+        data.trim_unreliable_runs(0)

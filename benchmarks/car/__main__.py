@@ -12,7 +12,6 @@ import argparse
 import json
 import os
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +19,11 @@ import joblib
 import numpy as np
 from scipy.stats import binomtest
 
-from benchmarks.car.collection import CAREFUL, collect_round, informative, train
 from benchmarks.car.compared_planners import BETA, PLANNERS, execute, plan_query
 from benchmarks.car.label_noise import measure_noise, print_noise
+from benchmarks.car.learning import learn
 from benchmarks.car.pictures import draw_all, draw_calibration
-from reliability import RELIABLE, Transitions, load_estimator
+from reliability import load_estimator
 from systems import Car, CarScene, random_car_scene
 
 TEST_SCENE_SEED, QUERY_SEED = 11, 12
@@ -36,9 +35,12 @@ SHIPPED = ("open_lot", "slalom", "narrow_gate")
 def main(arguments: list[str] | None = None) -> None:
     """Run the experiment."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", type=int, default=50, help="training scenes per round")
-    parser.add_argument("--plans", type=int, default=30, help="plans per scene and round")
-    parser.add_argument("--rounds", type=int, default=4, help="rounds of collecting")
+    parser.add_argument(
+        "--plans", type=int, default=1500, help="of a round; four times in the first"
+    )
+    parser.add_argument("--validation", type=int, default=100, help="problems that compare rounds")
+    parser.add_argument("--rounds", type=int, default=4, help="rounds of collecting, at most")
+    parser.add_argument("--scenes", type=int, default=50, help="to look for pictures and noise in")
     parser.add_argument("--test-scenes", type=int, default=20, help="scenes to test in")
     parser.add_argument("--queries", type=int, default=10, help="queries per test scene")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
@@ -47,7 +49,7 @@ def main(arguments: list[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     options.out.mkdir(parents=True, exist_ok=True)
 
-    classifier = load_estimator(options.model) if options.model else learn(options)
+    classifier = load_estimator(options.model) if options.model else learned(options)
     joblib.dump(classifier, options.out / "car.joblib")
     draw_all(classifier, options.out, options.scenes)
     print(f"Pictures are in {options.out}.")
@@ -69,31 +71,10 @@ def main(arguments: list[str] | None = None) -> None:
     draw_calibration(noise, options.out / "calibration.png")
 
 
-def learn(options: argparse.Namespace) -> Any:
-    """Collect and train, again and again; each round plans with what the last one learned."""
-    parts, rows, classifier = [], [], None
-    for number in range(options.rounds):
-        began = time.perf_counter()
-        # Plans without a classifier are cheap, and end early in what can be learned from.
-        n_plans = options.plans * (4 if number == 0 else 1)
-        part, X = collect_round(
-            number, classifier, options.scenes, n_plans, options.jobs, options.out
-        )
-        parts.append(part)
-        rows.append(X)
-        transitions, all_rows = Transitions.concatenate(parts), np.concatenate(rows)
-        # In what would be too careful to find plans at all, nothing is learned.
-        last = number == options.rounds - 1
-        classifier = train(transitions, all_rows, CAREFUL if last else "balanced")
-        kept = informative(transitions)
-        print(
-            f"Round {number}: {len(part):,} transitions, "
-            f"{np.mean(part.y == RELIABLE):.0%} Reliable; "
-            f"{kept.sum():,} to learn from so far, "
-            f"{np.mean(transitions.y[kept] == RELIABLE):.0%} Reliable; "
-            f"p_acc {classifier.validation_accuracy_:.3f}; {time.perf_counter() - began:.0f} s"
-        )
-    return classifier
+def learned(options: argparse.Namespace) -> Any:
+    """Learn in rounds."""
+    path = options.out / "rounds"
+    return learn(options.rounds, options.plans, options.validation, options.jobs, path)
 
 
 def experiment(

@@ -29,6 +29,7 @@ from systems import (
     Rollout,
     Rope,
     SceneRenderer,
+    load_scene,
 )
 
 MODELS = Path(__file__).parent / "models"
@@ -59,20 +60,23 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--size", type=int, nargs=2, default=(480, 360), help="of a picture")
     parser.add_argument("--out", type=Path, default=Path("build/rope"))
     parser.add_argument("--train", action="store_true", help="make the models anew")
+    parser.add_argument("--models", type=Path, default=MODELS, help="where --train writes them")
+    parser.add_argument("--training-plans", type=int, default=1500, help="of Simple Hook, a round")
     parser.add_argument("--jobs", type=int, default=-1, help="processes that collect data")
     options = parser.parse_args(arguments)
-    if options.train:
-        from benchmarks.rope.training import train_all
-
-        train_all(options.out / "training", MODELS, options.jobs)
-    estimator = load_estimator(options.model)
-    features = getattr(estimator, "provenance_", {}).get("features", options.features)
-    rope = Rope(options.scene, options.engine, features)
     folder = options.out / options.scene
     folder.mkdir(parents=True, exist_ok=True)
     width, height = options.size
     # Pictures come first: MuJoCo has to learn how to draw when it is imported.
-    with SceneRenderer(rope.scene, width=width, height=height) as pictures:
+    with SceneRenderer(load_scene(options.scene), width=width, height=height) as pictures:
+        if options.train:
+            from benchmarks.rope.training import train_all
+
+            data = options.out / "training"
+            train_all(data, options.models, options.training_plans, options.jobs)
+        estimator = load_estimator(options.model)
+        features = getattr(estimator, "provenance_", {}).get("features", options.features)
+        rope = Rope(options.scene, options.engine, features)
         caught, worked = compare(rope, estimator, options.plans)
         for name, trial in (("caught", caught), ("worked", worked)):
             if trial is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -14,37 +14,30 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.model_selection import GroupShuffleSplit, ShuffleSplit
 
 from benchmarks.rope.collection import (
-    N_PLANS,
     PAPER_SEED,
+    RANDOM_ITERATIONS,
     RANDOM_SCENE_SEED,
-    Round,
-    SceneData,
-    as_far_as_allowed,
-    collect_random_scenes,
+    TrainingScenes,
     collect_simple_hook,
-    described,
+    of_bands,
 )
+from planners import BiasedRRT
 from reliability import (
     FastHistGradientBoostingClassifier,
     TransitionReliabilityClassifier,
+    Transitions,
     VoxNet,
     __version__,
+    learn_in_rounds,
 )
+from systems import Rope, load_scene
 from systems.rope.features.clearance import mirrored, reversed_ends
 
 TRAINING_SEED = 0
 HELD_OUT = 0.1
-ROUNDS = (
-    Round(range(10_000, 11_200), biased=False),
-    Round(range(11_200, 11_400), biased=True),
-    Round(range(12_200, 12_400), biased=True),
-    Round(range(13_000, 18_500), biased=True, slotted=True),
-    Round(range(18_600, 20_600), biased=True, slotted=True),
-    Round(range(22_000, 23_600), biased=True, slotted=True),
-    Round(range(60_000, 61_600), biased=True, slotted=True),
-    Round(range(62_000, 63_450), biased=True, slotted=True),
-    Round(range(130_000, 132_000), biased=True, slotted=True),
-)
+ROWS_PER_EPOCH = 40_000
+N_ROUNDS = 3
+K = 10.0
 # Transitions of a plan that ours learns from after the rope was caught for good: about 0.4 m.
 N_AFTER = 15
 # A few large trees: chosen when each call of a tree cost as much as a few rows.
@@ -52,21 +45,23 @@ N_TREES = 40
 PACKAGES = ("numpy", "scikit-learn", "skorch", "torch", "mujoco")
 
 
-def train_all(folder: Path, models: Path, n_jobs: int) -> None:
+def train_all(folder: Path, models: Path, n_plans: int, n_jobs: int) -> None:
     """Collect, train and save all three; data and checkpoints that are in ``folder`` are used.
 
     Parameters
     ----------
     folder : Path
         For data and checkpoints.
+    n_plans : int
+        In Simple Hook for the paper's models, and in each round for ours.
     models : Path
         For ``rope_paper.joblib``, ``rope_vector.joblib`` and ``rope_ours.joblib``.
     n_jobs : int
         Processes that collect.
     """
-    simple_hook = collect_simple_hook(folder, N_PLANS, n_jobs)
+    simple_hook = of_bands(collect_simple_hook(folder, n_plans, n_jobs))
     save(train_vector(simple_hook), models / "rope_vector.joblib")
-    save(train_ours(simple_hook, folder, n_jobs), models / "rope_ours.joblib")
+    save(train_ours(folder, n_plans, n_jobs), models / "rope_ours.joblib")
     save(train_paper(simple_hook, folder / "voxnet.checkpoint"), models / "rope_paper.joblib")
 
 
@@ -78,18 +73,18 @@ def save(estimator: Any, path: Path) -> None:
     os.replace(partial, path)
 
 
-def train_paper(simple_hook: SceneData, checkpoint: Path) -> Any:
+def train_paper(simple_hook: Transitions, checkpoint: Path) -> Any:
     """Train VoxNet by the paper's protocol, on grids of half the resolution.
 
     Cells are pooled and an epoch draws 40,000 transitions, so that two cores need less than an
     hour; a tenth of the transitions is held out for p_acc, whatever plan they are of. Another
     tenth of the plans is kept apart.
     """
-    X, y, plans, _ = described([simple_hook], "voxels")
-    training, apart = _split(y, plans, HELD_OUT)
+    X, y = simple_hook.features(simple_hook_rope("voxels")), simple_hook.y
+    training, apart = _split(y, simple_hook.plan, HELD_OUT)
     classifier = TransitionReliabilityClassifier(
         VoxNet(pooling=2),
-        rows_per_epoch=40_000,
+        rows_per_epoch=min(ROWS_PER_EPOCH, len(y)),
         checkpoint=str(checkpoint),
         random_state=TRAINING_SEED,
         verbose=1,
@@ -98,16 +93,16 @@ def train_paper(simple_hook: SceneData, checkpoint: Path) -> Any:
     classifier.set_params(checkpoint=None)
     classifier.provenance_ = provenance(
         "voxels",
-        [simple_hook],
+        simple_hook,
         by_transition=classifier.validation_accuracy_,
         by_plan=float(np.mean(classifier.predict(X[apart]) == y[apart])),
     )
     return classifier
 
 
-def train_vector(simple_hook: SceneData) -> Any:
+def train_vector(simple_hook: Transitions) -> Any:
     """Train gradient boosting on the thirteen numbers, on Simple Hook alone."""
-    X, y, plans, _ = described([simple_hook], "vector")
+    X, y = simple_hook.features(simple_hook_rope("vector")), simple_hook.y
 
     def fitted(rows: np.ndarray) -> Any:
         boosting = HistGradientBoostingClassifier(
@@ -115,73 +110,78 @@ def train_vector(simple_hook: SceneData) -> Any:
         )
         return boosting.fit(X[rows], y[rows])
 
-    accuracies = _held_out_accuracies(fitted, X, y, plans)
+    by_transition, by_plan = _held_out_accuracies(fitted, X, y, simple_hook.plan)
     classifier = fitted(np.arange(len(y)))
-    classifier.validation_accuracy_ = accuracies[0]
+    classifier.validation_accuracy_ = by_transition
     classifier.provenance_ = provenance(
-        "vector", [simple_hook], by_transition=accuracies[0], by_plan=accuracies[1]
+        "vector", simple_hook, by_transition=by_transition, by_plan=by_plan
     )
     return classifier
 
 
-def train_ours(simple_hook: SceneData, folder: Path, n_jobs: int) -> Any:
-    """Train gradient boosting on "clearance" features, round by round; hold out whole scenes."""
-    parts, classifier = [worth_learning(simple_hook)], None
-    for i, plan in enumerate(ROUNDS):
-        found = collect_random_scenes(folder / f"random{i}", plan, classifier, n_jobs)
-        parts += map(worth_learning, found)
-        classifier = fit_clearance(parts)
-    return classifier
+def simple_hook_rope(features: str) -> Rope:
+    """Return the rope in the paper's scene of training."""
+    return Rope(load_scene("simple_hook"), features=features)
 
 
-def worth_learning(part: SceneData) -> SceneData:
-    """Leave out what g does not allow, and what plans did long after they went wrong for good."""
-    transitions = as_far_as_allowed(part).transitions
-    return SceneData(part.scenes, transitions.trim_unreliable_tail(N_AFTER))
-
-
-def fit_clearance(parts: Sequence[SceneData]) -> Any:
-    """Train on Simple Hook, which comes first, and random scenes.
-
-    Both weigh the same, and so do both labels in either. Each transition is learned as it is or
-    in one of its three mirror images.
-    """
-    X, y, plans, scenes = described(parts, "clearance")
-    weight = np.zeros(len(y))
-    for kind in (2 * (scenes > 0) + y == i for i in range(4)):
-        weight[kind] = len(y) / 4 / max(1, kind.sum())
-    _turn_into_images(X, np.random.default_rng(TRAINING_SEED))
-
-    def fitted(rows: np.ndarray) -> Any:
-        boosting = FastHistGradientBoostingClassifier(
+def train_ours(folder: Path, n_plans: int, n_jobs: int) -> Any:
+    """Train gradient boosting on "clearance" features, in rounds; see :class:`TrainingScenes`."""
+    result = learn_in_rounds(
+        MirroredBoosting(
             max_iter=N_TREES,
             learning_rate=0.2,
             max_leaf_nodes=63,
             max_features=0.2,
             early_stopping=False,
             random_state=TRAINING_SEED,
-        )
-        # scikit-learn takes minutes to bin weighted rows, so they are drawn by their weights.
-        rng = np.random.default_rng(TRAINING_SEED)
-        drawn = rng.choice(rows, len(rows), p=weight[rows] / weight[rows].sum())
-        return boosting.fit(X[drawn], y[drawn])
-
-    accuracies = _held_out_accuracies(fitted, X, y, np.where(scenes == 0, plans, -scenes))
-    classifier = fitted(np.arange(len(y)))
-    classifier.validation_accuracy_ = accuracies[0]
-    classifier.provenance_ = provenance("clearance", parts, *accuracies)
+        ),
+        BiasedRRT(None, k=K, max_iterations=RANDOM_ITERATIONS),
+        TrainingScenes(folder / "hard scenes"),
+        n_rounds=N_ROUNDS,
+        n_plans=n_plans,
+        n_validation=max(1, n_plans // 10),
+        labels="plan",
+        exploring_k=K,
+        n_after=N_AFTER,
+        on_error="skip",
+        path=folder / "rounds",
+        n_jobs=n_jobs,
+        random_state=RANDOM_SCENE_SEED,
+        verbose=1,
+    )
+    learned = result.transitions[result.round <= result.kept_round].trim_unreliable_runs(N_AFTER)
+    classifier = result.estimator.as_boosting()
+    classifier.provenance_ = provenance(
+        "clearance", learned, by_plan=classifier.validation_accuracy_
+    )
     return classifier
 
 
-def _turn_into_images(X: np.ndarray, rng: np.random.Generator) -> None:
-    kind = rng.integers(4, size=len(X))
-    X[kind % 2 == 1] = mirrored(X[kind % 2 == 1])
-    X[kind >= 2] = reversed_ends(X[kind >= 2])
+class MirroredBoosting(FastHistGradientBoostingClassifier):
+    """Learns each transition or one of its three mirror images; both labels weigh the same.
+
+    Parameters are :class:`reliability.FastHistGradientBoostingClassifier`'s.
+    """
+
+    def fit(self, X: np.ndarray, y: np.ndarray) -> MirroredBoosting:
+        """Fit on images of rows that are drawn by the weights of their labels."""
+        rng = np.random.default_rng(self.random_state)
+        # scikit-learn takes minutes to bin weighted rows.
+        weight = 1 / np.bincount(y)[y]
+        drawn = rng.choice(len(y), len(y), p=weight / weight.sum())
+        images, kind = X[drawn], rng.integers(4, size=len(y))
+        images[kind % 2 == 1] = mirrored(images[kind % 2 == 1])
+        images[kind >= 2] = reversed_ends(images[kind >= 2])
+        return super().fit(images, y[drawn])
+
+    def as_boosting(self) -> FastHistGradientBoostingClassifier:
+        """Return a classifier with the same trees, which a file can hold without this module."""
+        boosting = FastHistGradientBoostingClassifier(**self.get_params())
+        vars(boosting).update(vars(self))
+        return boosting
 
 
-def provenance(
-    features: str, parts: Sequence[SceneData], by_transition: float, by_plan: float
-) -> dict[str, Any]:
+def provenance(features: str, learned: Transitions, **accuracies: float) -> dict[str, Any]:
     """Tell where a model comes from."""
     return {
         "command": "python -m benchmarks.rope --train",
@@ -191,11 +191,10 @@ def provenance(
             "random scenes": RANDOM_SCENE_SEED,
             "training": TRAINING_SEED,
         },
-        "scenes": len({id(part.scenes[i]) for part in parts for i in part.transitions.scene}),
-        "plans": sum(len(np.unique(part.transitions.plan)) for part in parts),
-        "transitions": sum(len(part.transitions) for part in parts),
-        "accuracy by transition": by_transition,
-        "accuracy by plan": by_plan,
+        "scenes": len(np.unique(learned.scene)),
+        "plans": len(np.unique(learned.plan)),
+        "transitions": len(learned),
+        **{f"accuracy {name.replace('_', ' ')}": value for name, value in accuracies.items()},
         "versions": {name: version(name) for name in PACKAGES} | {"this library": __version__},
     }
 
