@@ -90,6 +90,7 @@ def train_paper(simple_hook: SceneData, checkpoint: Path) -> Any:
     classifier = TransitionReliabilityClassifier(
         VoxNet(pooling=2),
         rows_per_epoch=40_000,
+        patience=False,
         checkpoint=str(checkpoint),
         random_state=TRAINING_SEED,
         verbose=1,
