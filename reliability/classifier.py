@@ -42,9 +42,9 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
     """Predict whether a transition of the reduced model is reliable.
 
     A neural network that is trained on labelled transitions, with two classes. Part of the plans is
-    held out: training stops when the loss on them no longer falls, and the weights of the epoch
-    with the smallest are kept. Features may have any units with "mlp", and should be of order one
-    with other networks.
+    held out: training stops when the loss on them no longer falls, the weights of the epoch with
+    the smallest are kept, and probabilities are calibrated on them. With "mlp", features may have
+    any units; with other networks they should be of order one.
 
     Parameters
     ----------
@@ -76,9 +76,10 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         Share of the data that is held out: whole groups if ``fit`` is given groups, else single
         rows. 0.2 for "mlp", 0.1 for "voxnet".
     patience : int or False, default=None
-        Stop when the held-out loss has not improved for so many epochs, and keep the weights of
-        the epoch with the smallest: 5 for "mlp", 10 for "voxnet". False trains for ``max_epochs``
-        and keeps the last weights, as is done too if nothing is held out.
+        Stop when the held-out loss of calibrated probabilities has not improved for so many
+        epochs, and keep the weights of the epoch with the smallest: 5 for "mlp", 10 for "voxnet".
+        False trains for ``max_epochs`` and keeps the last weights, as is done too if nothing is
+        held out.
     class_weight : dict, "balanced" or None, default=None
         Weights of the classes in the loss, as in scikit-learn.
     balanced_batches : bool, default=None
@@ -113,11 +114,16 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         the predicted probability of the second class differs from its share among rows of alike
         probability, in ten bins. NaN if nothing was held out.
     history_ : list of dict
-        For each epoch ``epoch``, ``train_loss`` and, if rows were held out, ``valid_loss`` and
-        ``valid_accuracy``.
+        For each epoch ``epoch``, ``train_loss`` and, if rows were held out, ``valid_loss``,
+        ``calibrated_valid_loss`` and ``valid_accuracy``.
 
     Notes
     -----
+    After training, all logits are multiplied by one number, from 0.05 to 1, for which the
+    probabilities fit the held-out rows best (temperature scaling). Labels do not depend on it.
+    The held-out plans thus choose the epoch as well, which makes the attributes measured on them
+    a little too good.
+
     With "voxnet", the last digits of a row's logit may depend on the other rows of its batch, as
     with any tensor library; only a logit of almost zero could change its sign.
 
@@ -127,7 +133,8 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
 
     References
     ----------
-    McConachie et al. 2020, section IV, "Learning Transition Reliability".
+    McConachie et al. 2020, section IV, "Learning Transition Reliability". Guo et al. 2017, "On
+    calibration of modern neural networks".
 
     Examples
     --------

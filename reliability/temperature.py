@@ -33,13 +33,27 @@ def temperature_factor(
     ----------
     Guo et al. 2017, "On calibration of modern neural networks".
     """
+    return _fit(logits, positive, weight)[0]
+
+
+def calibrated_loss(
+    logits: NDArray[np.float64], positive: NDArray[np.bool_], weight: NDArray[np.float64]
+) -> float:
+    """Return the mean cross-entropy of logits that are multiplied by that factor."""
+    return _fit(logits, positive, weight)[1]
+
+
+def _fit(
+    logits: NDArray[np.float64], positive: NDArray[np.bool_], weight: NDArray[np.float64]
+) -> tuple[float, float]:
     if not weight.any():
-        return 1.0
+        return 1.0, float("nan")
     # Large where a label is predicted with confidence, negative where another is.
     margin = np.where(positive, logits, -logits)
 
     def loss(factor: float) -> float:
         return float(np.average(np.logaddexp(0, -factor * margin), weights=weight))
 
-    best = minimize_scalar(loss, bounds=(_SMALLEST, 1), method="bounded").x
-    return float(best) if loss(best) < loss(1) else 1.0
+    best = float(minimize_scalar(loss, bounds=(_SMALLEST, 1), method="bounded").x)
+    factor = best if loss(best) < loss(1) else 1.0
+    return factor, loss(factor)

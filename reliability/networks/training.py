@@ -16,12 +16,12 @@ from reliability.networks.batches import Batches, LabelledRows, digest
 from reliability.networks.checkpoint import Checkpoint
 from reliability.networks.devices import check_device, one_thread
 from reliability.networks.hyperparameters import Hyperparameters, as_plain
-from reliability.networks.metrics import EpochMetrics, WeightedLoss
+from reliability.networks.metrics import CALIBRATED_LOSS, EpochMetrics, WeightedLoss
 from reliability.networks.progress import ProgressBar
 
 # A training and its continuation may differ in this.
 _FREE = {"max_epochs"}
-_RECORDED = ("epoch", "train_loss", "valid_loss", "valid_accuracy")
+_RECORDED = ("epoch", "train_loss", "valid_loss", CALIBRATED_LOSS, "valid_accuracy")
 
 
 class TrainingTask(NamedTuple):
@@ -126,7 +126,7 @@ def _early_stopping(task: TrainingTask) -> EarlyStopping | None:
     if patience is False or not len(task.held_out):
         return None
     return EarlyStopping(
-        "valid_loss", patience=patience, threshold=0.0, load_best=True, sink=_no_output
+        CALIBRATED_LOSS, patience=patience, threshold=0.0, load_best=True, sink=_no_output
     )
 
 
