@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import partial
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from reliability.networks.hyperparameters import Hyperparameters, as_plain, chec
 from reliability.networks.mlp_inference import MLPInference
 from reliability.networks.voxel_format import check_pooling, grid_shape
 from systems.validation import check_count
+
+if TYPE_CHECKING:
+    from reliability.networks.batches import LabelledRows
 
 
 class Backend(BaseEstimator, ABC):
@@ -27,12 +30,15 @@ class Backend(BaseEstimator, ABC):
         For those that the classifier leaves at None.
     row_types : list of type
         Types of number that rows may have. Rows of another type are converted to the first.
+    fewest_batches : int
+        Batches of an epoch at least: fewer rows are gone through several times in each.
     rows_per_forward : int
         Rows that one forward pass takes at most.
     """
 
     defaults: ClassVar[Hyperparameters]
     row_types: ClassVar[list[Any]] = [np.float32]
+    fewest_batches: ClassVar[int] = 1
     rows_per_forward: ClassVar[int] = 8192
 
     @abstractmethod
@@ -51,6 +57,15 @@ class Backend(BaseEstimator, ABC):
     def module(self, n_features: int, packed: bool) -> Any:
         """Build a torch module, with random weights, that maps (n, n_features) rows to n logits."""
 
+    def module_for(self, training: LabelledRows) -> Any:
+        """Build a module, with random weights, to be trained on rows."""
+        return self.module(training.rows.shape[1], training.rows.dtype == np.uint8)
+
+    def weights(self, module: Any) -> dict[str, NDArray[Any]]:
+        """Return a trained module's parameters and buffers by name."""
+        tensors = module.state_dict().items()
+        return {name: tensor.detach().cpu().numpy().copy() for name, tensor in tensors}
+
     def inference(self, n_features: int, packed: bool, weights: dict[str, NDArray[Any]]) -> Any:
         """Return what computes the logits of a trained module.
 
@@ -59,7 +74,7 @@ class Backend(BaseEstimator, ABC):
         n_features, packed
             As given to :meth:`module`.
         weights : dict of ndarray
-            The trained module's parameters and buffers by name.
+            As :meth:`weights` gives them.
         """
         from reliability.networks.module_inference import ModuleInference
 
@@ -69,6 +84,9 @@ class Backend(BaseEstimator, ABC):
 
 class MLP(Backend):
     """The paper's network for the arm: fully connected layers with LeakyReLU, and one logit.
+
+    For the training, features are standardized by the mean and standard deviation of the training
+    rows, so that they may have any unit; the first layer's weights then take this in.
 
     Parameters
     ----------
@@ -88,7 +106,9 @@ class MLP(Backend):
         epochs_per_decay=1,
         validation_fraction=0.2,
         balanced_batches=False,
+        patience=5,
     )
+    fewest_batches = 10
 
     def __init__(self, hidden_layer_sizes: tuple[int, ...] = (256, 128, 64)) -> None:
         self.hidden_layer_sizes = hidden_layer_sizes
@@ -108,6 +128,17 @@ class MLP(Backend):
         from reliability.networks.mlp_module import MLPModule
 
         return MLPModule(n_features, as_plain(self.hidden_layer_sizes))
+
+    def module_for(self, training: LabelledRows) -> Any:
+        """Build the layers, with random weights, and standardize what comes in."""
+        module = super().module_for(training)
+        module.standardize(*training.mean_and_scale())
+        return module
+
+    def weights(self, module: Any) -> dict[str, NDArray[Any]]:
+        """Return the layers' weights, for features that are not standardized."""
+        module.take_in_scaling()
+        return super().weights(module)
 
     def inference(self, n_features: int, packed: bool, weights: dict[str, NDArray[Any]]) -> Any:
         """Return the compiled forward pass, which is fast for a few rows."""
@@ -149,6 +180,7 @@ class VoxNet(Backend):
         epochs_per_decay=4,
         validation_fraction=0.1,
         balanced_batches=True,
+        patience=10,
     )
     row_types: ClassVar[list[Any]] = [np.float32, np.uint8]
     rows_per_forward = 64

@@ -15,10 +15,12 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from reliability.backends import Backend, as_backend
 from reliability.base_rate import warn_if_no_better_than_base_rate, weighted_share
+from reliability.calibration_curve import CalibrationCurve
 from reliability.model_files import ModelFileError
 from reliability.networks.constant_inference import ConstantInference
 from reliability.networks.hyperparameters import Hyperparameters
 from reliability.networks.voxel_format import check_packed
+from reliability.temperature import temperature_factor
 from reliability.training_set import (
     check_sample_weight,
     encode_labels,
@@ -39,8 +41,10 @@ _ROWS_AT_ONCE = 16384
 class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
     """Predict whether a transition of the reduced model is reliable.
 
-    A neural network that is trained on labelled transitions, with two classes. Features should be
-    of order one.
+    A neural network that is trained on labelled transitions, with two classes. Part of the plans is
+    held out: training stops when the loss on them no longer falls, the weights of the epoch with
+    the smallest are kept, and probabilities are calibrated on them. With "mlp", features may have
+    any units; with other networks they should be of order one.
 
     Parameters
     ----------
@@ -66,13 +70,16 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         1 for "mlp", 4 for "voxnet".
     rows_per_epoch : int, default=None
         Train on so many rows per epoch, drawn at random, and compute the held-out loss of an epoch
-        from at most as many. None takes all rows.
+        from at most as many. None takes all rows; with "mlp", several times if they are fewer than
+        10 batches, as a few steps teach little.
     validation_fraction : float, default=None
         Share of the data that is held out: whole groups if ``fit`` is given groups, else single
         rows. 0.2 for "mlp", 0.1 for "voxnet".
-    patience : int, default=None
-        Stop when the held-out loss has not improved for so many epochs, and keep the weights of
-        the epoch with the smallest. None trains for ``max_epochs`` and keeps the last weights.
+    patience : int or False, default=None
+        Stop when the held-out loss of calibrated probabilities has not improved for so many
+        epochs, and keep the weights of the epoch with the smallest: 5 for "mlp", 10 for "voxnet".
+        False trains for ``max_epochs`` and keeps the last weights, as is done too if nothing is
+        held out.
     class_weight : dict, "balanced" or None, default=None
         Weights of the classes in the loss, as in scikit-learn.
     balanced_batches : bool, default=None
@@ -102,12 +109,21 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
     validation_accuracy_ : float
         Share of the held-out rows, weighted with ``sample_weight``, that are predicted right: the
         paper's p_acc, which planners use. NaN if nothing was held out.
+    validation_calibration_error_ : float
+        Expected calibration error of the held-out rows' probabilities: by how much, on average,
+        the predicted probability of the second class differs from its share among rows of alike
+        probability, in ten bins. NaN if nothing was held out.
     history_ : list of dict
-        For each epoch ``epoch``, ``train_loss`` and, if rows were held out, ``valid_loss`` and
-        ``valid_accuracy``.
+        For each epoch ``epoch``, ``train_loss`` and, if rows were held out, ``valid_loss``,
+        ``calibrated_valid_loss`` and ``valid_accuracy``.
 
     Notes
     -----
+    After training, all logits are multiplied by one number, from 0.05 to 1, for which the
+    probabilities fit the held-out rows best (temperature scaling). Labels do not depend on it.
+    The held-out plans thus choose the epoch as well, which makes the attributes measured on them
+    a little too good.
+
     With "voxnet", the last digits of a row's logit may depend on the other rows of its batch, as
     with any tensor library; only a logit of almost zero could change its sign.
 
@@ -117,7 +133,8 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
 
     References
     ----------
-    McConachie et al. 2020, section IV, "Learning Transition Reliability".
+    McConachie et al. 2020, section IV, "Learning Transition Reliability". Guo et al. 2017, "On
+    calibration of modern neural networks".
 
     Examples
     --------
@@ -145,7 +162,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         epochs_per_decay: int | None = None,
         rows_per_epoch: int | None = None,
         validation_fraction: float | None = None,
-        patience: int | None = None,
+        patience: int | bool | None = None,
         class_weight: dict[Any, float] | str | None = None,
         balanced_batches: bool | None = None,
         device: str = "cpu",
@@ -238,8 +255,14 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
             backend, hyperparameters, training, held_out, rng
         )
         validated = held_out.select(held_out.index[weight[held_out.index] > 0])
-        right = self._is_right(validated)
+        logits = self._logits_of(validated).astype(np.float64)
+        is_second = validated.target[validated.index] == 1
+        factor = temperature_factor(logits, is_second, loss_weight[validated.index])
+        self._inference.soften(factor)
+        right = (logits > 0) == is_second
         self.validation_accuracy_ = weighted_share(right, weight[validated.index])
+        calibration = CalibrationCurve.of(is_second, expit(factor * logits))
+        self.validation_calibration_error_ = calibration.expected_error
         if groups is not None:
             plans = np.asarray(groups)[validated.index]
             warn_if_no_better_than_base_rate(
@@ -379,12 +402,13 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         weights, history = train(task)
         return backend.inference(self.n_features_in_, self._packed, weights), history
 
-    def _is_right(self, data: LabelledRows) -> NDArray[np.bool_]:
-        """Say of each row whether its label is predicted."""
-        right = np.empty(len(data), dtype=np.bool_)
+    def _logits_of(self, data: LabelledRows) -> NDArray[np.float32]:
+        """Return the logit of each row, shape (n,)."""
+        logits = np.empty(len(data), dtype=np.float32)
         # Some at a time, as X may be a file larger than memory.
         for begin in range(0, len(data), _ROWS_AT_ONCE):
             part = data.index[begin : begin + _ROWS_AT_ONCE]
-            positive = self._inference.logits(data.rows[part], self.device) > 0
-            right[begin : begin + _ROWS_AT_ONCE] = positive == data.target[part]
-        return right
+            logits[begin : begin + _ROWS_AT_ONCE] = self._inference.logits(
+                data.rows[part], self.device
+            )
+        return logits

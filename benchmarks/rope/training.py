@@ -85,6 +85,7 @@ def train_paper(simple_hook: Transitions, checkpoint: Path) -> Any:
     classifier = TransitionReliabilityClassifier(
         VoxNet(pooling=2),
         rows_per_epoch=min(ROWS_PER_EPOCH, len(y)),
+        patience=False,
         checkpoint=str(checkpoint),
         random_state=TRAINING_SEED,
         verbose=1,

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from sklearn.preprocessing import StandardScaler
 from torch import Tensor
 from torch.utils.data import Dataset
 
 # Columns of the labels of a batch.
 TARGET, LOSS_WEIGHT, SAMPLE_WEIGHT = range(3)
 _BYTES_AT_ONCE = 2**26
+_ROWS_AT_ONCE = 2**16
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +72,16 @@ class LabelledRows(Dataset[Any]):
         columns = (self.target[index], self.loss_weight[index], self.sample_weight[index])
         labels = np.column_stack(columns).astype(np.float32)
         return torch.from_numpy(self.rows[index]), torch.from_numpy(labels)
+
+    def mean_and_scale(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return each feature's mean and standard deviation, 1 where it is constant.
+
+        Read piece by piece, as the rows may be a file larger than memory.
+        """
+        scaler = StandardScaler()
+        for first in range(0, len(self), _ROWS_AT_ONCE):
+            scaler.partial_fit(self.rows[self.index[first : first + _ROWS_AT_ONCE]])
+        return scaler.mean_, scaler.scale_
 
     def digests(self) -> dict[str, str]:
         """Return a digest of each of the arrays, to tell whether two trainings have the same."""

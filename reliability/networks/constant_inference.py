@@ -30,3 +30,6 @@ class ConstantInference:
         return np.full(len(rows), self.logit, dtype=np.float32)
 
     fast_logits = logits
+
+    def soften(self, factor: float) -> None:
+        """Leave the logit as it is: there was nothing else to learn."""

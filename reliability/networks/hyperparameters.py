@@ -9,8 +9,7 @@ import numpy as np
 
 from systems.validation import check_count, check_number
 
-_COUNTS = ("max_epochs", "batch_size", "epochs_per_decay")
-_OPTIONAL_COUNTS = ("rows_per_epoch", "patience")
+_COUNTS = ("max_epochs", "batch_size", "epochs_per_decay", "rows_per_epoch")
 
 
 @dataclass(frozen=True)
@@ -24,8 +23,8 @@ class Hyperparameters:
     epochs_per_decay: int
     validation_fraction: float
     balanced_batches: bool
+    patience: int | bool
     rows_per_epoch: int | None = None
-    patience: int | None = None
 
     def overridden_by(self, classifier: Any) -> Hyperparameters:
         """Return these with the classifier's own values in place of those that it gives.
@@ -61,9 +60,11 @@ def check_flag(value: Any, name: str) -> None:
 
 
 def _check(given: dict[str, Any]) -> None:
-    for name in (*_COUNTS, *_OPTIONAL_COUNTS):
+    for name in _COUNTS:
         if name in given:
             check_count(given[name], name)
+    if not _is_false(given.get("patience", False)):
+        check_count(given["patience"], "patience")
     if "learning_rate" in given:
         check_number(given["learning_rate"], "learning_rate", 0, np.inf)
         if given["learning_rate"] == np.inf:
@@ -73,3 +74,7 @@ def _check(given: dict[str, Any]) -> None:
             check_number(given[name], name, 0, 1)
     if "balanced_batches" in given:
         check_flag(given["balanced_batches"], "balanced_batches")
+
+
+def _is_false(value: Any) -> bool:
+    return isinstance(value, bool | np.bool_) and not value

@@ -5,11 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from skorch import NeuralNet
 from skorch.callbacks import Callback
 from torch import Tensor, nn
 
 from reliability.networks.batches import LOSS_WEIGHT, SAMPLE_WEIGHT, TARGET
+from reliability.temperature import calibrated_loss
+
+# What early stopping goes by. The plain loss rises as soon as a network grows too sure of itself,
+# which can be mended afterwards, although it still learns to tell the labels apart.
+CALIBRATED_LOSS = "calibrated_valid_loss"
 
 
 class WeightedLoss(nn.Module):
@@ -49,6 +55,7 @@ class EpochMetrics(Callback):
     def on_epoch_begin(self, net: NeuralNet, **kwargs: Any) -> None:
         """Begin to count."""
         self.held_out_ = WeightedAccuracy()
+        self.answers_: list[NDArray[Any]] = []
 
     def on_batch_end(self, net: NeuralNet, batch: Any, training: bool, **kwargs: Any) -> None:
         """Count a batch."""
@@ -57,7 +64,9 @@ class EpochMetrics(Callback):
         name = "train_batch_size" if training else "valid_batch_size"
         net.history.record_batch(name, float(labels[:, LOSS_WEIGHT].sum()))
         if not training:
-            self.held_out_.add(kwargs["y_pred"], labels)
+            logits = kwargs["y_pred"].reshape(-1)
+            self.held_out_.add(logits, labels)
+            self.answers_.append(np.column_stack([logits.cpu(), labels.cpu()]))
 
     def on_epoch_end(self, net: NeuralNet, **kwargs: Any) -> None:
         """Record the accuracy, and raise ``FloatingPointError`` if the loss is not finite."""
@@ -71,3 +80,8 @@ class EpochMetrics(Callback):
         row["batches"].clear()  # One entry per batch would outgrow the network.
         if self.held_out_.total:
             net.history.record("valid_accuracy", self.held_out_.share)
+            net.history.record(CALIBRATED_LOSS, self._calibrated_loss())
+
+    def _calibrated_loss(self) -> float:
+        logits, labels = np.split(np.concatenate(self.answers_).astype(np.float64), [1], axis=1)
+        return calibrated_loss(logits[:, 0], labels[:, TARGET] > 0.5, labels[:, LOSS_WEIGHT])

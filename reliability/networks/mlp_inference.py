@@ -18,10 +18,11 @@ from systems.compilation import compiled
 # From so many rows on, the tensor library is faster in spite of its import.
 ROWS_FOR_TORCH = 2048
 LEAKY_SLOPE = np.float32(0.01)
-# A generous bound on what rounding does to a logit, per unit of the row's largest feature.
+# A generous bound on what rounding does to a logit, per unit of the largest term in the first sums.
 LOGIT_ROUNDING = np.float32(1e-4)
 # Rows that are multiplied with each part of the weights while it is in the fastest cache.
 ROWS_PER_BLOCK = 8
+_REBUILT = ("_in_torch", "_flat", "_largest_weights")
 
 
 class MLPInference:
@@ -66,7 +67,7 @@ class MLPInference:
             return self.fast_logits(rows, device)
         logits = self._in_torch.logits(rows, device)
         # Near zero the two ways may round to different signs, so the compiled one decides.
-        largest = 1 + np.abs(rows).max(axis=1)
+        largest = 1 + np.abs(rows * self._largest_weights).max(axis=1)
         uncertain = np.abs(logits) < LOGIT_ROUNDING * largest
         logits[uncertain] = self.fast_logits(rows[uncertain], device)
         return logits
@@ -76,10 +77,17 @@ class MLPInference:
         rows = np.array(rows, dtype=np.float32, order="C")
         return mlp_logits(rows, *self._flat, LEAKY_SLOPE)
 
+    def soften(self, factor: float) -> None:
+        """Multiply all logits by a positive factor from now on."""
+        *_, weight, bias = self.weights.values()
+        weight *= np.float32(factor)
+        bias *= np.float32(factor)
+        for rebuilt in _REBUILT:
+            self.__dict__.pop(rebuilt, None)
+
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what is rebuilt from the weights."""
-        rebuilt = ("_in_torch", "_flat")
-        return {name: value for name, value in self.__dict__.items() if name not in rebuilt}
+        return {name: value for name, value in self.__dict__.items() if name not in _REBUILT}
 
     @cached_property
     def _in_torch(self) -> Any:
@@ -87,6 +95,12 @@ class MLPInference:
         from reliability.networks.module_inference import ModuleInference
 
         return ModuleInference(self.build, self.weights, self.rows_per_forward)
+
+    @cached_property
+    def _largest_weights(self) -> NDArray[np.float32]:
+        """The largest weight of each feature, at least 1: of tiny features they are large."""
+        first = next(iter(self.weights.values()))
+        return np.maximum(np.abs(first).max(axis=0), 1)
 
     @cached_property
     def _flat(self) -> tuple[NDArray[np.int64], NDArray[np.float32]]:

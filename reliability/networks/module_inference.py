@@ -30,6 +30,7 @@ class ModuleInference:
     """
 
     prefers_batches = True
+    factor = 1.0
 
     def __init__(
         self, build: Callable[[], Any], weights: dict[str, NDArray[Any]], rows_per_forward: int
@@ -60,9 +61,13 @@ class ModuleInference:
         with one_thread(), torch.inference_mode():
             batches = [rows[first : first + n] for first in range(0, len(rows), n)]
             parts = [module(_as_tensor(batch).to(place)).reshape(-1).cpu() for batch in batches]
-            return torch.cat(parts).numpy()
+            return torch.cat(parts).numpy() * np.float32(self.factor)
 
     fast_logits = logits
+
+    def soften(self, factor: float) -> None:
+        """Multiply all logits by a positive factor from now on."""
+        self.factor *= factor
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out the modules, which are rebuilt from the weights."""

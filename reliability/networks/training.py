@@ -6,7 +6,6 @@ import os
 from functools import partial
 from typing import Any, NamedTuple
 
-import numpy as np
 import torch
 from numpy.typing import NDArray
 from skorch import NeuralNet
@@ -17,12 +16,12 @@ from reliability.networks.batches import Batches, LabelledRows, digest
 from reliability.networks.checkpoint import Checkpoint
 from reliability.networks.devices import check_device, one_thread
 from reliability.networks.hyperparameters import Hyperparameters, as_plain
-from reliability.networks.metrics import EpochMetrics, WeightedLoss
+from reliability.networks.metrics import CALIBRATED_LOSS, EpochMetrics, WeightedLoss
 from reliability.networks.progress import ProgressBar
 
 # A training and its continuation may differ in this.
 _FREE = {"max_epochs"}
-_RECORDED = ("epoch", "train_loss", "valid_loss", "valid_accuracy")
+_RECORDED = ("epoch", "train_loss", "valid_loss", CALIBRATED_LOSS, "valid_accuracy")
 
 
 class TrainingTask(NamedTuple):
@@ -73,16 +72,15 @@ def train(task: TrainingTask) -> tuple[dict[str, NDArray[Any]], list[dict[str, f
     is_whole = len(history) == task.hyperparameters.max_epochs and "train_loss" in history[-1]
     if not is_whole and not _has_stopped(stop):
         raise KeyboardInterrupt
-    tensors = net.module_.state_dict().items()
-    weights = {name: tensor.detach().cpu().numpy().copy() for name, tensor in tensors}
+    weights = task.backend.weights(net.module_)
     rows = [{name: as_plain(row[name]) for name in _RECORDED if name in row} for row in history]
     return weights, rows
 
 
 def _network(task: TrainingTask, callbacks: list[tuple[str, Callback]]) -> NeuralNet:
-    rows, chosen = task.training.rows, task.hyperparameters
+    chosen = task.hyperparameters
     return NeuralNet(
-        partial(task.backend.module, rows.shape[1], rows.dtype == np.uint8),
+        partial(task.backend.module_for, task.training),
         criterion=WeightedLoss,
         optimizer=torch.optim.Adam,
         optimizer__fused=True,
@@ -125,10 +123,10 @@ def _callbacks(task: TrainingTask, stop: EarlyStopping | None) -> list[tuple[str
 
 def _early_stopping(task: TrainingTask) -> EarlyStopping | None:
     patience = task.hyperparameters.patience
-    if patience is None or not len(task.held_out):
+    if patience is False or not len(task.held_out):
         return None
     return EarlyStopping(
-        "valid_loss", patience=patience, threshold=0.0, load_best=True, sink=_no_output
+        CALIBRATED_LOSS, patience=patience, threshold=0.0, load_best=True, sink=_no_output
     )
 
 
@@ -137,7 +135,9 @@ def _has_stopped(stop: EarlyStopping | None) -> bool:
 
 
 def _rows_per_epoch(task: TrainingTask) -> int:
-    return task.hyperparameters.rows_per_epoch or len(task.training)
+    chosen = task.hyperparameters
+    fewest = task.backend.fewest_batches * chosen.batch_size
+    return chosen.rows_per_epoch or max(len(task.training), fewest)
 
 
 def _identity(task: TrainingTask) -> dict[str, str]:
