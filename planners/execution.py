@@ -147,6 +147,10 @@ def execute(
     ValueError
         If an argument is unfit, or the planner refuses the problem.
 
+    Notes
+    -----
+    ``docs/execution.md`` says what this is worth on four systems, and where it does not help.
+
     References
     ----------
     Vemula et al. 2020 (CMAX), for distrusting transitions that failed.
