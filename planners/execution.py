@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from planners.distrust import DistrustedTransitions
 from planners.goals import has_succeeded
 from planners.planning_problem import can_start
+from planners.remaining_plan import still_arrives
 from reliability.scenes import SceneFamily
 from systems.errors import SimulationDivergedError
 from systems.system import Array, Problem, System
@@ -66,7 +67,8 @@ class Execution:
         Commands that were given; where the system stopped at the boundary of a constraint, the
         one under way too.
     plans : list of PlanResult
-        All that were made, in order. Without ``success``, the last one was not carried out.
+        All that were made, in order. One without ``success`` or without commands was not carried
+        out; what came before it was.
     plan_starts : list of int
         For each plan, the number of the state from which it was made.
     planning_time : float
@@ -101,16 +103,27 @@ class Execution:
 def execute(
     system: System, planner: Any, problem: Problem, *, tolerance: float, max_replans: int = 0
 ) -> Execution:
-    """Plan, carry the plan out, and plan again where the system leaves it.
+    """Plan, carry the plan out, and plan again where it fails.
 
-    As long as replans are left, the plan is carried out command by command. If a reduced state is
-    not Close to the planned one, if the system stops at the boundary of a constraint, or if the
-    plan ends and the goal is missed, a new plan is made from the true state. The transition that
-    failed is not used again near that place in this execution: for new plans, g has no successor
-    where a transition begins Close to it with about the same motion.
+    As long as replans are left, the plan is carried out command by command, and a new one is made
+    from the true state
 
-    If no new plan is found, or none may start there, the rest of the old one is carried out, as
-    without replans. So is the last plan, to its end, once all replans are used up.
+    - where the system stopped at the boundary of a constraint;
+    - where the plan ended and the goal was missed;
+    - where a reduced state is not Close to the planned one, if g predicts that the rest of the
+      plan does not arrive from there: a transition is not valid, or the last one ends farther than
+      ``tolerance`` from the plan's end.
+
+    Leaving a plan is not failing: where commands are places to go to, the next one leads back to
+    it. A plan is therefore followed as long as g does not say that it fails.
+
+    If no new plan is found, or none may start where the system is, the old one is carried out,
+    and planning is tried again where it ends or the system stops. Once all replans are used up,
+    the last plan is carried out to its end.
+
+    A transition after which the system was not Close to the plan is not used again near that
+    place in this execution: for new plans and the rest of the old one, g has no successor where a
+    transition begins Close to it with about the same motion.
 
     Parameters
     ----------
@@ -123,7 +136,8 @@ def execute(
         How near to the goal the true state has to come, as :meth:`systems.System.succeeded`
         takes it.
     max_replans : int, default=0
-        Plans to make after the first. 0 carries one plan out to its end, whatever happens.
+        Plans to make after the first, those that were not found among them. 0 carries one plan
+        out to its end, whatever happens.
 
     Returns
     -------
@@ -133,6 +147,10 @@ def execute(
     ------
     ValueError
         If an argument is unfit, or the planner refuses the problem.
+
+    Notes
+    -----
+    ``docs/execution.md`` says what this is worth on four systems, and where it does not help.
 
     References
     ----------
@@ -184,19 +202,22 @@ class _Run:
         self._distrusted = DistrustedTransitions(self.system)
         self._seed = as_seed(getattr(self.planner, "random_state", None))
         self._remaining: NDArray[Any] = np.empty((0, 0))
+        self._followed: Array = self._reduced()[None]
 
     def to_the_end(self, max_replans: int) -> ExecutionStatus:
         self._plan()
         if not self.plans[0].success:
             return ExecutionStatus.NO_PLAN
-        for _ in range(max_replans):
-            self._follow()
+        hindrance = None
+        while len(self.plans) <= max_replans:
+            self._follow(give_up=hindrance is None)
             if self._arrived():
                 return ExecutionStatus.REACHED
+            over = len(self._remaining) == 0
             hindrance = self._replan()
-            if hindrance is not None:
-                return self._finish(hindrance)
-        return self._finish(None)
+            if over and hindrance is not None:
+                return hindrance
+        return self._finish(hindrance)
 
     def ended(self, status: ExecutionStatus) -> Execution:
         commands = np.array(self.commands) if self.commands else self.plans[0].commands[:0]
@@ -220,27 +241,38 @@ class _Run:
         self.planning_time += time.perf_counter() - began
         self.plans.append(plan)
         self.plan_starts.append(len(self.states) - 1)
-        if plan.success:
-            self._remaining = plan.commands
+        if plan.success and len(plan.commands):
+            self._remaining, self._followed = plan.commands, plan.reduced
         return bool(plan.success)
 
     def _replan(self) -> ExecutionStatus | None:
-        """Plan anew; return why that was not possible or did not help, or None."""
+        """Plan anew; return None, or why the old plan is still the one to follow."""
         if not can_start(self.system, self._reduced()):
             return ExecutionStatus.START_NOT_ALLOWED
         if not self._plan():
             return ExecutionStatus.NO_PLAN
-        return None if len(self._remaining) else ExecutionStatus.MISSED
+        return None if len(self.plans[-1].commands) else ExecutionStatus.MISSED
 
-    def _follow(self) -> None:
-        """Carry the plan out until the system leaves it, or to its end."""
-        plan = self.plans[-1]
-        for planned, following in zip(plan.reduced[:-1], plan.reduced[1:], strict=True):
+    def _follow(self, give_up: bool) -> None:
+        """Carry the plan out until it ends or the system stops, or is given up if it may be."""
+        while len(self._remaining):
+            number = len(self._followed) - 1 - len(self._remaining)
+            planned, following = self._followed[number : number + 2]
             before, command = self._reduced(), self._remaining[:1]
             completed = self._give(command)
-            if not (completed and self.system.close(following[None], self._reduced()[None])[0]):
-                self._distrust(before, command, (planned, following))
+            if completed and self.system.close(following[None], self._reduced()[None])[0]:
+                continue
+            self._distrust(before, command, (planned, following))
+            if give_up and self._can_do_better():
                 return
+
+    def _can_do_better(self) -> bool:
+        """Say whether g predicts that the rest of the plan fails, where a new one may start."""
+        system, here, end = self.system, self._reduced(), self._followed[-1]
+        if not can_start(system, here):
+            return False
+        trusted = self._distrusted.left_out_of(system)
+        return not still_arrives(trusted, here, self._remaining, end, self.tolerance)
 
     def _finish(self, hindrance: ExecutionStatus | None) -> ExecutionStatus:
         """Carry out what remains of the plan; return how it ended, or what kept from replanning."""
@@ -251,8 +283,7 @@ class _Run:
             return hindrance
         if stopped:
             return ExecutionStatus.CONSTRAINT
-        end = self.plans[-1].reduced[-1:]
-        missed = self.system.close(end, self._reduced()[None])[0]
+        missed = self.system.close(self._followed[-1:], self._reduced()[None])[0]
         return ExecutionStatus.MISSED if missed else ExecutionStatus.LEFT_PLAN
 
     def _give(self, commands: Array) -> bool:
