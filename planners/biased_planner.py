@@ -134,7 +134,9 @@ class BiasedPlanner(BaseEstimator):
         """
         self._check_parameters()
         attempts = self._attempts(starts_reduced, goal, terminated)
-        best = best_until_enough(attempts, self.min_success, lambda plan: plan.success_probability)
+        # Any plan would be good enough for 0, which asks for nothing.
+        enough = self.min_success if self.min_success > 0 else 1.0
+        best = best_until_enough(attempts, enough, lambda plan: plan.success_probability)
         return self._judged(best)
 
     def _attempts(
