@@ -19,6 +19,7 @@ from planners.budget import Budget, never
 from planners.check_transition import CheckTransition
 from planners.edge_checker import EdgeChecker
 from planners.path import Path
+from planners.plan_turning import plan_turning
 from planners.planning_problem import PlanningProblem
 from planners.restarts import best_until_enough
 from planners.result import PlanResult, PlanStatus
@@ -286,6 +287,7 @@ class BiasedPlanner(BaseEstimator):
             n_accepted_unreliable=check.n_accepted_unreliable,
             tree=found.tree,
             random_state=seed,
+            turning=plan_turning(self.system, reduced),
         )
 
 

@@ -70,6 +70,9 @@ class PlanResult:
     calibrated_probability : float or None, default=None
         Probability that the plan goes well, from the planner's ``calibration``; None where the
         planner has none or there is no plan.
+    turning : float, default=0.0
+        How much the motion changes from each transition to the next, in steps; see
+        :func:`planners.plan_turning.plan_turning`.
     """
 
     reduced: Array
@@ -84,6 +87,7 @@ class PlanResult:
     tree: Array
     random_state: int
     calibrated_probability: float | None = None
+    turning: float = 0.0
 
     @property
     def solved(self) -> bool:

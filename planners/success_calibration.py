@@ -30,9 +30,11 @@ class SuccessCalibration(BaseEstimator):
     one another and the estimator's probabilities are right; it is mostly far too low. The
     calibration learns from executed plans how often plans like this one went well: logistic
     regression on the plan's negative log-likelihood (the sum of -log(reliability) of its
-    transitions), on the number of its transitions, and on the negative log-likelihoods of its least
-    reliable and of its last transition. The last counts by itself because with labels after Eq. 3
-    it is Reliable if the execution is where the plan ends.
+    transitions), on the number of its transitions, on the negative log-likelihoods of its least
+    reliable and of its last transition, and on the plan's ``turning``. The last transition counts
+    by itself because with labels after Eq. 3 it is Reliable if the execution is where the plan
+    ends. Turning counts because estimators are asked about single transitions, and can't know of
+    what lasts from one to the next.
 
     Fit it on plans made by the planner that will use it (with the same estimator, the same k and so
     on), for problems that the estimator has not learned from. A hundred plans are few.
@@ -219,14 +221,14 @@ class SuccessCalibration(BaseEstimator):
 
 
 def _features(results: Sequence[PlanResult]) -> Array:
-    """Describe plans by what their success depends on, shape (n, 4)."""
+    """Describe plans by what their success depends on, shape (n, 5)."""
     rows = []
     for result in results:
         assert result.reliability is not None
         costs = negative_log_likelihood(result.reliability)
         # The logarithm keeps a few transitions of probability 0 from outweighing all else.
         total, worst, last = np.log1p([costs.sum(), costs.max(initial=0.0), costs[-1:].sum()])
-        rows.append([total, len(costs), worst, last])
+        rows.append([total, len(costs), worst, last, result.turning])
     return np.array(rows)
 
 
