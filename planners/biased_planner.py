@@ -21,6 +21,7 @@ from planners.check_transition import CheckTransition
 from planners.edge_checker import EdgeChecker
 from planners.path import Path
 from planners.plan_robustness import plan_robustness
+from planners.plan_turning import plan_turning
 from planners.planning_problem import PlanningProblem
 from planners.restarts import best_until_enough
 from planners.result import PlanResult, PlanStatus
@@ -151,7 +152,9 @@ class BiasedPlanner(BaseEstimator):
             # Shown at the line that calls plan.
             warn_if_permissive(self.k, p_acc, stacklevel=3)
         attempts = self._attempts(starts_reduced, goal, terminated)
-        best = best_until_enough(attempts, self.min_success, lambda plan: plan.success_probability)
+        # Any plan would be good enough for 0, which asks for nothing.
+        enough = self.min_success if self.min_success > 0 else 1.0
+        best = best_until_enough(attempts, enough, lambda plan: plan.success_probability)
         return self._judged(best)
 
     def _attempts(
@@ -318,6 +321,7 @@ class BiasedPlanner(BaseEstimator):
             n_accepted_unreliable=check.n_accepted_unreliable,
             tree=found.tree,
             random_state=seed,
+            turning=plan_turning(self.system, reduced),
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -43,6 +43,9 @@ class Evaluation:
     n_replans : ndarray of int of shape (n_problems,)
     success_probability : ndarray of shape (n_problems,)
         Of the first plan; NaN if the planner's results have none.
+    plans : list of PlanResult
+        The first plan, or why there is none, without its tree; None for a planner that returns
+        anything else.
     """
 
     tolerance: float
@@ -56,6 +59,7 @@ class Evaluation:
     n_transitions: NDArray[np.int64]
     n_replans: NDArray[np.int64]
     success_probability: Array
+    plans: list[Any] = field(default_factory=list, repr=False)
 
     @classmethod
     def of(
@@ -77,7 +81,7 @@ class Evaluation:
         """
         columns = {name: [one[name] for one in outcomes] for name in outcomes[0]}
         columns["status"] = [ExecutionStatus[name] for name in columns["status"]]
-        lists = ("status", "stop_reason")
+        lists = ("status", "stop_reason", "plans")
         values: dict[str, Any] = {
             name: column if name in lists else np.array(column) for name, column in columns.items()
         }
@@ -112,6 +116,26 @@ class Evaluation:
     def success_share(self) -> Share:
         """Executed successes among all problems, with Wilson's interval."""
         return Share.of(self.n_succeeded, self.n_problems)
+
+    @property
+    def executed_plans(self) -> tuple[list[Any], NDArray[np.bool_]]:
+        """The plans that were carried out, and whether each succeeded.
+
+        What :class:`SuccessCalibration` learns from:
+        ``SuccessCalibration().fit(*evaluation.executed_plans)``.
+
+        Raises
+        ------
+        ValueError
+            If ``max_replans`` is not 0: a success is then not the first plan's alone.
+        """
+        if self.max_replans:
+            raise ValueError(
+                "executed_plans are those of an evaluation without replans: a success after "
+                f"replanning is not the first plan's. Here max_replans is {self.max_replans}."
+            )
+        carried_out = [plan for plan, solved in zip(self.plans, self.solved, strict=True) if solved]
+        return carried_out, self.succeeded[self.solved]
 
     @property
     def success_auc(self) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 
 from planners.evaluation import Evaluation
 from planners.execution import Execution, check_max_replans, execute
+from planners.kept_plan import item_of, plan_of
 from reliability.identity import describe_planner
 from reliability.item_files import Item
 from reliability.plan_execution import PlanFailedError, causes_restored
@@ -20,7 +21,7 @@ from reliability.store import Job, ResumableStore, run_jobs
 from systems.system import System
 from systems.validation import RandomState, as_seed, check_count, check_number
 
-_KIND = "a planner's executions of unseen problems, one problem in each file"
+_KIND = "a planner's first plans and executions of unseen problems, one problem in each file"
 # No collection has a plan of this number, so that none has these seeds.
 _PURPOSE = (2**32 - 1,)
 
@@ -121,9 +122,11 @@ def evaluate(
     jobs = [Job(f"problem-{task.number:07d}", task, store) for task in tasks]
     with causes_restored():
         items = run_jobs(jobs, n_jobs=n_jobs, verbose=verbose, unit="problem")
-    evaluation = Evaluation.of(
-        [item.facts for item in items], float(tolerance), int(max_replans), seed
-    )
+    outcomes = [
+        {**item.facts["outcome"], "plans": plan_of(Item(item.facts["plan"], item.arrays))}
+        for item in items
+    ]
+    evaluation = Evaluation.of(outcomes, float(tolerance), int(max_replans), seed)
     if verbose:
         print(evaluation)
     return evaluation
@@ -159,7 +162,9 @@ class _Task:
             raise PlanFailedError.of(
                 error, self.number, self.scene, planner.random_state, problem
             ) from error
-        return Item({"scene": self.scene, **_outcome(execution)})
+        plan = item_of(execution.plans[0])
+        outcome = {"scene": self.scene, **_outcome(execution)}
+        return Item({"outcome": outcome, "plan": plan.facts}, plan.arrays)
 
 
 def _outcome(execution: Execution) -> dict[str, Any]:

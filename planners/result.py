@@ -74,6 +74,9 @@ class PlanResult:
         Share of slightly varied models that predict the same end as the plan; None without a plan
         or an estimator, or if the system does not define ``vary``. See
         :func:`planners.plan_robustness.plan_robustness`.
+    turning : float, default=0.0
+        How much the motion changes from each transition to the next, in steps; see
+        :func:`planners.plan_turning.plan_turning`.
     """
 
     reduced: Array
@@ -89,6 +92,7 @@ class PlanResult:
     random_state: int
     calibrated_probability: float | None = None
     robustness: float | None = None
+    turning: float = 0.0
 
     @property
     def solved(self) -> bool:

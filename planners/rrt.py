@@ -51,8 +51,10 @@ class BiasedRRT(BiasedPlanner):
     min_success : float, default=0.0
         A plan whose ``success_probability`` is less gets the status ``DISTRUSTED``.
     restarts : int, default=0
-        How often to plan again, with seeds that follow from ``random_state``, while there is no
-        plan or only a distrusted one. The likeliest plan is returned; times and counts add up.
+        How often to plan again, with seeds that follow from ``random_state``. The plan with the
+        highest ``success_probability`` is returned; times and counts add up. Planning ends early
+        with a plan of at least ``min_success``, or of 1 where ``min_success`` is 0: then all
+        restarts are made, and the likeliest plan is carried out, however unlikely it is.
     random_state : int, Generator, RandomState, SeedSequence or None, default=None
 
     References

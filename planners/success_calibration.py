@@ -35,10 +35,12 @@ class SuccessCalibration(BaseEstimator):
     The product of the reliabilities is that probability only if transitions fail independently of
     one another and the estimator's probabilities are right; it is mostly far too low. The
     calibration learns from executed plans how often plans like this one went well: logistic
-    regression on the number of the plan's transitions, and on the logarithms of three negative
-    log-likelihoods: that of the plan (the sum of -log(reliability) of its transitions), that of its
-    least reliable transition, and that of its last. The last counts by itself because with labels
-    after Eq. 3 it is Reliable if the execution is where the plan ends.
+    regression on the number of the plan's transitions, on the logarithms of three negative
+    log-likelihoods, and on the plan's ``turning``. The likelihoods are that of the plan (the sum of
+    -log(reliability) of its transitions), that of its least reliable transition, and that of its
+    last. The last counts by itself because with labels after Eq. 3 it is Reliable if the execution
+    is where the plan ends. Turning counts because estimators are asked about single transitions,
+    and can't know of what lasts from one to the next.
 
     What it learns is how often a plan goes well if the true system goes the way that g predicts. A
     plan with a ``robustness`` does so only with that probability, by which the learned one is
@@ -242,7 +244,7 @@ class SuccessCalibration(BaseEstimator):
 
 
 def _features(results: Sequence[PlanResult]) -> Array:
-    """Describe plans by what their success depends on, shape (n, 4)."""
+    """Describe plans by what their success depends on, shape (n, 5)."""
     rows = []
     for result in results:
         assert result.reliability is not None
@@ -250,7 +252,7 @@ def _features(results: Sequence[PlanResult]) -> Array:
         total, worst, last = np.log(
             LEAST_COST + np.array([costs.sum(), costs.max(initial=0.0), costs[-1:].sum()])
         )
-        rows.append([total, len(costs), worst, last])
+        rows.append([total, len(costs), worst, last, result.turning])
     return np.array(rows)
 
 

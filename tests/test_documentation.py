@@ -11,13 +11,17 @@ from enum import Enum
 from pathlib import Path
 
 import pytest
+from sklearn.linear_model import LogisticRegression
+from toy_systems import Disc
 
 import planners
 import reliability
 import systems
+from planners import BiasedRRTConnect
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = (systems, reliability, planners)
+PAGES = sorted((ROOT / "docs").glob("*.md"))
 
 
 @pytest.mark.parametrize(
@@ -78,8 +82,39 @@ def test_the_readmes_rope_scene_can_be_learned(tmp_path, monkeypatch, capsys):
     assert "The plan reaches the goal." in capsys.readouterr().out
 
 
+def test_the_page_on_what_did_not_help_can_be_followed(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / "it_did_not_help.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", page, flags=re.S)
+    assert len(blocks) == 5
+    code = "\n".join(blocks)
+    for number, fewer in ((" 600,", " 40,"), ("=300", "=20"), (" 200,", " 40,"), (" 100,", " 20,")):
+        assert number in code
+        code = code.replace(number, fewer)
+    system = Disc()
+    without = BiasedRRTConnect(system, max_iterations=200)
+    data = reliability.collect_transitions(system, without, 40, random_state=0)
+    classifier = LogisticRegression().fit(data.features(system), data.y)
+    planner = BiasedRRTConnect(system, classifier, accuracy=0.9, k=3.0, max_iterations=200)
+    names = {name: value for name, value in locals().items() if name not in ("page", "code")}
+    exec(compile(code, "it_did_not_help.md", "exec"), names)
+    shown = capsys.readouterr().out
+    for part in ("only this : only none succeeds", "base rate (one label", "Round 0:"):
+        assert part in shown
+    plan = planner.set_params(random_state=0).plan([-0.9, 0.0], [0.9, 0.0])
+    assert plan.calibrated_probability is not None
+
+
 @pytest.mark.parametrize(
-    "document", ["README.md", "CONTRIBUTING.md", "docs/features.md", "examples/README.md"]
+    "document",
+    [
+        "README.md",
+        "CONTRIBUTING.md",
+        "docs/features.md",
+        "docs/it_did_not_help.md",
+        "docs/labels.md",
+        "examples/README.md",
+    ],
 )
 def test_what_documents_mention_exists(document):
     text = (ROOT / document).read_text()
@@ -176,3 +211,9 @@ def test_heavy_libraries_have_one_home(library, allowed):
         file.relative_to(ROOT).as_posix() for file in files if pattern.search(file.read_text())
     }
     assert homes == allowed
+
+
+@pytest.mark.parametrize("document", ["README.md", *(f"docs/{page.name}" for page in PAGES)])
+def test_links_lead_to_files(document):
+    for link in re.findall(r"\]\((?!https?:)([^)#]+)", (ROOT / document).read_text()):
+        assert ((ROOT / document).parent / link).exists(), link

@@ -1,5 +1,6 @@
 """Evaluations: unseen problems in order, counted with intervals, the same however it is run."""
 
+import copy
 import json
 from dataclasses import replace
 
@@ -14,7 +15,15 @@ from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import roc_auc_score
 from toy_systems import Disc
 
-from planners import BiasedRRTConnect, Evaluation, ExecutionStatus, Share, evaluate, execute
+from planners import (
+    BiasedRRTConnect,
+    Evaluation,
+    ExecutionStatus,
+    Share,
+    SuccessCalibration,
+    evaluate,
+    execute,
+)
 from reliability import PlanFailedError, StoreError, collect_transitions
 from systems import Problem, SimulationDivergedError
 
@@ -348,3 +357,44 @@ def test_an_estimators_planner_is_evaluated_too(disc_data):
     evaluation = assess(Disc(), planner, 10, max_replans=2)
     assert ((evaluation.success_probability > 0) & (evaluation.success_probability < 1)).all()
     assert assess(Peg(), BiasedRRTConnect(None), 3).n_solved == 3
+
+
+# Plans, for SuccessCalibration to learn from
+
+
+@pytest.fixture(scope="module")
+def judging_planner():
+    X = np.random.default_rng(0).uniform(
+        -1, 1, (40, Disc().features(*np.zeros((2, 1, 2))).shape[1])
+    )
+    return BiasedRRTConnect(None, LogisticRegression().fit(X, X[:, 0] > 0), k=0.1, accuracy=0.9)
+
+
+def test_plans_are_those_that_were_carried_out_also_when_read_again(judging_planner, tmp_path):
+    disc = Disc()
+    problems = noted(evaluate, disc, Noting(), 6, tolerance=0.1)
+    for _ in range(2):
+        evaluation = assess(disc, judging_planner, 6, path=tmp_path / "kept")
+        for (start, goal, seed), kept in zip(problems, evaluation.plans, strict=True):
+            planner = copy.copy(judging_planner).set_params(system=disc, random_state=seed)
+            plan = planner.plan(start, goal)
+            for name in ("reduced", "commands", "reliability"):
+                np.testing.assert_array_equal(getattr(kept, name), getattr(plan, name))
+            assert kept.status is plan.status
+            assert (kept.n_checked, kept.random_state) == (plan.n_checked, seed)
+            assert kept.success_probability == plan.success_probability
+
+
+def test_a_calibration_learns_from_an_evaluation(judging_planner):
+    evaluation = assess(Disc(), copy.copy(judging_planner).set_params(max_iterations=8))
+    plans, succeeded = evaluation.executed_plans
+    assert len(plans) == len(succeeded) == evaluation.n_solved < evaluation.n_problems
+    assert sum(succeeded) == evaluation.n_succeeded
+    calibration = SuccessCalibration().fit(plans, succeeded)
+    assert calibration.predict_proba(evaluation.plans).shape == (N, 2)
+
+
+def test_plans_that_were_replanned_are_no_plans_to_learn_from():
+    with pytest.raises(ValueError, match="max_replans is 1"):
+        _ = assess(Point(), max_replans=1, n_problems=2).executed_plans
+    assert assess(Point(), n_problems=2).plans == [None, None], "toys have plans of their own"

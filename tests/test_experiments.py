@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -85,3 +86,26 @@ def test_acceptance_rules_are_compared_on_the_same_problems(tmp_path, arm_classi
         assert len(files) == n_problems * len(SETTINGS)
         assert kept.items() <= files.items(), "more problems go on where fewer stopped"
         kept = files
+
+
+def test_own_systems_goes_all_roads_and_counts_each(tmp_path):
+    size = ("--plans", 120, "--problems", 6, "--first-seed", 50)
+    options = ("--systems", "suspended load", *size, "--out", tmp_path / "out")
+    shown = run("-m", "benchmarks.own_systems", *options, cwd=tmp_path)
+    for road in ("none", "0.1", "new, one plan", "new", "new, replanning"):
+        assert re.search(rf"^{road}: \d of 6, ", shown, flags=re.M)
+    assert "balanced accuracy (chance is 0.5)" in shown
+    assert re.search(r"^Failures (not )?halved: \d with the new road, \d without\.$", shown, re.M)
+    again = run("-m", "benchmarks.own_systems", *options, cwd=tmp_path)
+    assert shown.splitlines()[-1] == again.splitlines()[-1]
+
+
+def test_labels_compares_the_same_executions_labelled_in_three_ways(tmp_path):
+    options = ("--systems", "suspended load", "--share", 0.05, "--out", tmp_path / "out")
+    shown = run("-m", "benchmarks.labels", *options, cwd=tmp_path)
+    rows = {
+        kind: int(re.search(rf"^{kind} +([\d,]+) +[\d.]+%", shown, flags=re.M)[1].replace(",", ""))
+        for kind in ("plan", "executed", "both")
+    }
+    assert rows["both"] == rows["plan"] + rows["executed"]
+    assert re.search(r"^executed +\d+ +\d+ .* : \d+  \(p = ", shown, flags=re.M)
