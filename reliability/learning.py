@@ -127,7 +127,9 @@ def learn_in_rounds(
         "plan" gives the labels of the paper.
     exploring_k : float, default=6.0
         ``k`` of the planner from round 1 on. Not infinite, so that plans also go where the
-        estimator is wrong, and the next round finds out.
+        estimator is wrong, and the next round finds out. Little hangs on it: 1, 3, 6, 10 and
+        infinity gave 150, 139, 142, 148 and 141 successes of 200 on both of
+        ``examples/own_systems`` together, which is chance.
     n_after : int, default=1
         How many of a plan's Unreliable transitions in a row to learn from, where labels are of
         "plan": see :meth:`Transitions.trim_unreliable_runs`.
