@@ -117,7 +117,7 @@ def draw(worth: dict[str, Worth], path: Path) -> None:
         axis.set(xlim=(-0.03, 1.03), ylim=(-0.03, 1.06), xlabel="probability of success")
         axis.title.set_fontsize("medium")
     axes[0, 0].set_ylabel("share that succeeds")
-    axes[0, 0].legend(fontsize="small", loc="upper left")
+    axes[0, 0].legend(fontsize="small", loc="lower right")
     figure.savefig(path, dpi=110)
 
 
