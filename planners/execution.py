@@ -163,7 +163,7 @@ def execute(
     >>> arm = PlanarArm()
     >>> planner = BiasedRRTConnect(arm, random_state=0)
     >>> execute(arm, planner, arm.sample_problem(7), tolerance=0.1, max_replans=5)
-    Execution(REACHED, 37 commands, 2 replans)
+    Execution(REACHED, 42 commands, 0 replans)
     """
     check_number(tolerance, "tolerance", 0, np.inf)
     check_max_replans(max_replans)
