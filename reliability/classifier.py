@@ -44,8 +44,8 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
     A neural network that is trained on labelled transitions, with two classes. Part of the plans is
     held out: training stops when the loss on them no longer falls, the weights of the epoch with
     the smallest are kept, and probabilities are calibrated on them. With "mlp", features may have
-    any units; with other networks they should be of order one. With few plans, boosted trees
-    may do better: see docs/classifiers.md.
+    any units; with other networks they should be of order one. With few plans and
+    features that have corners, boosted trees do better: see docs/classifiers.md.
 
     Parameters
     ----------
