@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from sklearn.base import clone
 from sklearn.metrics import balanced_accuracy_score
 from sklearn.model_selection import GroupShuffleSplit
 from threadpoolctl import threadpool_limits
+from torch import nn
 
 from examples.own_systems.suspended_load import SuspendedLoad
 from examples.own_systems.tractor_trailer import TractorTrailer
@@ -30,8 +32,6 @@ from reliability import (
     Transitions,
     collect_transitions,
 )
-from reliability.calibration_curve import CalibrationCurve
-from reliability.networks.mlp_module import MLPModule
 from systems import PlanarArm, System
 
 TRAINING_SEED, TEST_SEED, PROBLEM_SEED = 11, 12, 13
@@ -48,11 +48,15 @@ SYSTEMS = {
 }
 
 
-class PlainNetwork(MLPModule):
+class PlainNetwork(nn.Sequential):
     """The layers of "mlp", whose features are not standardized and epochs are single passes."""
 
     def __init__(self, n_features: int) -> None:
-        super().__init__(n_features, (256, 128, 64))
+        sizes = (n_features, 256, 128, 64)
+        layers: list[nn.Module] = []
+        for n_inputs, n_outputs in pairwise(sizes):
+            layers += [nn.Linear(n_inputs, n_outputs), nn.LeakyReLU()]
+        super().__init__(*layers, nn.Linear(sizes[-1], 1))
 
 
 CLASSIFIERS = {
@@ -168,9 +172,16 @@ def accuracy(
     return (
         float(balanced_accuracy_score(test.y, predicted)),
         float(classifier.validation_accuracy_ - np.mean(predicted == test.y)),
-        CalibrationCurve.of(test.y == 1, probability).expected_error,
+        calibration_error(test.y == 1, probability),
         told,
     )
+
+
+def calibration_error(positive: np.ndarray, probability: np.ndarray) -> float:
+    """Return the expected calibration error in ten bins of equal width."""
+    bins = np.minimum((10 * probability).astype(int), 9)
+    gaps = np.bincount(bins, probability - positive, minlength=10)
+    return float(np.abs(gaps).sum() / len(positive))
 
 
 def _mean_and_spread(values: tuple[float, ...]) -> str:

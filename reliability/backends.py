@@ -85,8 +85,8 @@ class Backend(BaseEstimator, ABC):
 class MLP(Backend):
     """The paper's network for the arm: fully connected layers with LeakyReLU, and one logit.
 
-    For the training, features are standardized by the mean and standard deviation of the training
-    rows, so that they may have any unit; the first layer's weights then take this in.
+    For the training, features are standardized by the median and the spread of the middle half of
+    the training rows, so that they may have any unit; the first layer's weights then take this in.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class MLP(Backend):
     def module_for(self, training: LabelledRows) -> Any:
         """Build the layers, with random weights, and standardize what comes in."""
         module = super().module_for(training)
-        module.standardize(*training.mean_and_scale())
+        module.standardize(*training.middle_and_scale())
         return module
 
     def weights(self, module: Any) -> dict[str, NDArray[Any]]:

@@ -44,7 +44,8 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
     A neural network that is trained on labelled transitions, with two classes. Part of the plans is
     held out: training stops when the loss on them no longer falls, the weights of the epoch with
     the smallest are kept, and probabilities are calibrated on them. With "mlp", features may have
-    any units; with other networks they should be of order one.
+    any units; with other networks they should be of order one. With few plans and
+    features that have corners, boosted trees do better: see docs/classifiers.md.
 
     Parameters
     ----------
@@ -345,6 +346,11 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         """
         decision = self.decision_function(X)
         return self.classes_[(decision > 0).astype(np.intp)]
+
+    def check_weights(self) -> None:
+        """Raise ``ValueError`` if the trained weights do not fit together, as in a damaged file."""
+        check_is_fitted(self)
+        self._inference.check(self.n_features_in_)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Refuse the state of another format."""

@@ -12,6 +12,7 @@ from sklearn.ensemble import BaseEnsemble, HistGradientBoostingClassifier
 from sklearn.tree import BaseDecisionTree
 from sklearn.utils.validation import check_is_fitted
 
+from reliability.classifier import TransitionReliabilityClassifier
 from reliability.fast_inference.trees import check_boosting_nodes, check_tree_nodes
 from systems.validation import is_integer
 
@@ -38,6 +39,8 @@ def check_model(model: Any) -> None:
             check_tree_nodes(part.tree_, n_features, type(part).__name__)
         elif isinstance(part, HistGradientBoostingClassifier):
             _check_boosting(part, n_features)
+        elif isinstance(part, TransitionReliabilityClassifier):
+            part.check_weights()
     _check_answer(model)
 
 

@@ -198,6 +198,24 @@ def test_boosting_that_was_tampered_with_is_refused(harm, tmp_path):
         load_estimator(tmp_path / "model.skops")
 
 
+@pytest.mark.parametrize("harm", ["cut", "NaN", "wide", "features"])
+def test_a_network_that_was_tampered_with_is_refused(harm, tmp_path):
+    model = fitted("mlp")
+    inference = model.__getstate__()["_inference"]
+    first = next(iter(inference.weights))
+    if harm == "cut":
+        inference.weights[first] = inference.weights[first][:-1]
+    elif harm == "NaN":
+        inference.weights[first][0, 0] = np.nan
+    elif harm == "wide":
+        inference.weights[first] = inference.weights[first].astype(np.float64)
+    else:
+        model.n_features_in_ = 3
+    write_model(tmp_path / "model.skops", model)
+    with pytest.raises(ModelFileError, match="the weights"):
+        load_estimator(tmp_path / "model.skops")
+
+
 @pytest.mark.parametrize("wrapped", [False, True])
 @pytest.mark.parametrize(
     ("field", "value"), [("left_child", 10**6), ("left_child", 0), ("feature", 10**6)]

@@ -10,14 +10,17 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from sklearn.preprocessing import StandardScaler
 from torch import Tensor
 from torch.utils.data import Dataset
+
+from reliability.training_set import thin
 
 # Columns of the labels of a batch.
 TARGET, LOSS_WEIGHT, SAMPLE_WEIGHT = range(3)
 _BYTES_AT_ONCE = 2**26
-_ROWS_AT_ONCE = 2**16
+_MOST_SCALED = 2**16
+# How far apart the quartiles of a normal distribution are, in standard deviations.
+_NORMAL_QUARTILES = 1.349
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,15 +76,23 @@ class LabelledRows(Dataset[Any]):
         labels = np.column_stack(columns).astype(np.float32)
         return torch.from_numpy(self.rows[index]), torch.from_numpy(labels)
 
-    def mean_and_scale(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return each feature's mean and standard deviation, 1 where it is constant.
+    def middle_and_scale(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return each feature's median and spread, of at most 65,536 of the rows.
 
-        Read piece by piece, as the rows may be a file larger than memory.
+        The spread is that of the middle half, as a normal distribution's standard deviation, since
+        a few wild values must not make all others look alike; but at least a tenth of the standard
+        deviation, so that wild values stay within reason. It is 1 for a constant feature.
+
+        Returns
+        -------
+        middle, scale : ndarray of shape (n_features,)
         """
-        scaler = StandardScaler()
-        for first in range(0, len(self), _ROWS_AT_ONCE):
-            scaler.partial_fit(self.rows[self.index[first : first + _ROWS_AT_ONCE]])
-        return scaler.mean_, scaler.scale_
+        rows = self.rows[thin(self.index, _MOST_SCALED)].astype(np.float64)
+        low, middle, high = np.percentile(rows, [25, 50, 75], axis=0)
+        deviation = rows.std(axis=0)
+        spread = np.maximum((high - low) / _NORMAL_QUARTILES, deviation / 10)
+        scale = np.where(high > low, spread, deviation)
+        return middle, np.where(rows.min(axis=0) < rows.max(axis=0), scale, 1.0)
 
     def digests(self) -> dict[str, str]:
         """Return a digest of each of the arrays, to tell whether two trainings have the same."""

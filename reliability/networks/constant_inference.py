@@ -31,5 +31,10 @@ class ConstantInference:
 
     fast_logits = logits
 
+    def check(self, n_features: int) -> None:
+        """Raise ``ValueError`` unless the logit is finite."""
+        if not np.isfinite(self.logit):
+            raise ValueError("the logit is not finite")
+
     def soften(self, factor: float) -> None:
         """Leave the logit as it is: there was nothing else to learn."""

@@ -77,6 +77,18 @@ class MLPInference:
         rows = np.array(rows, dtype=np.float32, order="C")
         return mlp_logits(rows, *self._flat, LEAKY_SLOPE)
 
+    def check(self, n_features: int) -> None:
+        """Raise ``ValueError`` unless the weights fit together, as the compiled pass relies on."""
+        arrays = list(self.weights.values())
+        width = n_features
+        for weight, bias in zip(arrays[0::2], arrays[1::2], strict=True):
+            fits = weight.dtype == bias.dtype == np.float32 and weight.shape == (len(bias), width)
+            if not fits or bias.ndim != 1 or not np.isfinite(weight).all():
+                raise ValueError("the weights of a layer do not fit those before")
+            width = len(bias)
+        if not arrays or width != 1 or not all(np.isfinite(array).all() for array in arrays):
+            raise ValueError("the weights do not lead to one finite logit")
+
     def soften(self, factor: float) -> None:
         """Multiply all logits by a positive factor from now on."""
         *_, weight, bias = self.weights.values()

@@ -20,7 +20,7 @@ class MLPModule(nn.Module):
     hidden_layer_sizes : tuple of int
     """
 
-    mean: Tensor
+    middle: Tensor
     scale: Tensor
 
     def __init__(self, n_features: int, hidden_layer_sizes: tuple[int, ...]) -> None:
@@ -31,21 +31,21 @@ class MLPModule(nn.Module):
             layers += [nn.Linear(n_inputs, n_outputs), nn.LeakyReLU()]
         self.layers = nn.Sequential(*layers, nn.Linear(sizes[-1], 1))
         # Not persistent: the weights of a trained module have taken them in.
-        self.register_buffer("mean", torch.zeros(n_features), persistent=False)
+        self.register_buffer("middle", torch.zeros(n_features), persistent=False)
         self.register_buffer("scale", torch.ones(n_features), persistent=False)
 
     def forward(self, rows: Tensor) -> Tensor:
         """Map (n, n_features) rows to (n, 1) logits."""
-        return self.layers((rows - self.mean) / self.scale)
+        return self.layers((rows - self.middle) / self.scale)
 
-    def standardize(self, mean: NDArray[np.float64], scale: NDArray[np.float64]) -> None:
-        """Subtract a mean from each feature and divide it by a scale, before the first layer.
+    def standardize(self, middle: NDArray[np.float64], scale: NDArray[np.float64]) -> None:
+        """Subtract a middle from each feature and divide it by a scale, before the first layer.
 
         Parameters
         ----------
-        mean, scale : ndarray of shape (n_features,)
+        middle, scale : ndarray of shape (n_features,)
         """
-        self.mean.copy_(torch.from_numpy(mean))
+        self.middle.copy_(torch.from_numpy(middle))
         self.scale.copy_(torch.from_numpy(scale))
 
     @torch.no_grad()
@@ -53,7 +53,7 @@ class MLPModule(nn.Module):
         """Let the first layer give for features what it gave for standardized ones."""
         first: Any = self.layers[0]
         weight = first.weight.double() / self.scale.double()
-        first.bias.copy_(first.bias.double() - weight @ self.mean.double())
+        first.bias.copy_(first.bias.double() - weight @ self.middle.double())
         first.weight.copy_(weight)
-        self.mean.zero_()
+        self.middle.zero_()
         self.scale.fill_(1)

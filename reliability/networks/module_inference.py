@@ -65,6 +65,11 @@ class ModuleInference:
 
     fast_logits = logits
 
+    def check(self, n_features: int) -> None:
+        """Raise ``ValueError`` unless all weights are finite; torch itself checks their shapes."""
+        if not all(np.isfinite(weight).all() for weight in self.weights.values()):
+            raise ValueError("a weight is not finite")
+
     def soften(self, factor: float) -> None:
         """Multiply all logits by a positive factor from now on."""
         self.factor *= factor
