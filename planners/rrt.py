@@ -20,8 +20,8 @@ class BiasedRRT(BiasedPlanner):
         Any fitted classifier of ``system.features``; None plans without bias.
     k : float, default=1.0
         How strict the search is, see ``acceptance``; np.inf rejects every Unreliable transition.
-        The default is the smallest that makes sense: with p_acc 0.9 it accepts 41 % of them, and
-        planners then warn (:class:`PermissiveAcceptanceWarning`). k=10 accepts 0.01 %.
+        With "fixed" and p_acc 0.9, the default accepts 41 % of them and k=10 0.01 %; planners warn
+        of more than a tenth (:class:`PermissiveAcceptanceWarning`).
     accuracy : float, default=None
         p_acc, the estimator's accuracy on held-out data, which only "fixed" needs. None takes
         ``validation_accuracy_``.
@@ -38,6 +38,8 @@ class BiasedRRT(BiasedPlanner):
           is accepted. A search that is stuck takes ever greater risks, the smallest first.
 
         The last two need ``predict_proba``, and are as good as its probabilities are calibrated.
+        Recommended are "fixed" with k=10, and "probability" with k=3 where that finds no plan: see
+        ``docs/acceptance.md``, which compares the three.
     simplify : bool, default=True
         Take shortcuts of which every transition is classified Reliable.
     max_iterations : int, default=20000

@@ -33,8 +33,8 @@ class BiasedRRTConnect(BiasedPlanner):
         Any fitted classifier of ``system.features``; None plans without bias.
     k : float, default=1.0
         How strict the search is, see ``acceptance``; np.inf rejects every Unreliable transition.
-        The default is the smallest that makes sense: with p_acc 0.9 it accepts 41 % of them, and
-        planners then warn (:class:`PermissiveAcceptanceWarning`). k=10 accepts 0.01 %.
+        With "fixed" and p_acc 0.9, the default accepts 41 % of them and k=10 0.01 %; planners warn
+        of more than a tenth (:class:`PermissiveAcceptanceWarning`).
     accuracy : float, default=None
         p_acc, the estimator's accuracy on held-out data, which only "fixed" needs. None takes
         ``validation_accuracy_``.
@@ -51,6 +51,8 @@ class BiasedRRTConnect(BiasedPlanner):
           is accepted. A search that is stuck takes ever greater risks, the smallest first.
 
         The last two need ``predict_proba``, and are as good as its probabilities are calibrated.
+        Recommended are "fixed" with k=10, and "probability" with k=3 where that finds no plan: see
+        ``docs/acceptance.md``, which compares the three.
     transitions_per_edge : int, default=5
         Longest edge of the trees, in transitions. An edge is added only if every one of its
         transitions is accepted, so the longer the edges, the stronger the bias at the same k.

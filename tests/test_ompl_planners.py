@@ -497,8 +497,10 @@ def test_nothing_of_ompl_is_left_behind():
         """
         import sys
         sys.path.insert(0, "tests")
-        import gc, weakref
+        import gc, warnings, weakref
+        from planners import PermissiveAcceptanceWarning
         from test_ompl_planners import *
+        warnings.simplefilter("ignore", PermissiveAcceptanceWarning)
         ou.setLogLevel(ou.LOG_NONE)
 
         def solved(planner, seed):

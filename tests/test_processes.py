@@ -42,7 +42,7 @@ def test_nothing_complains_at_exit():
         + """
 for planner in (BiasedRRTConnect, BiasedRRT):
     for estimator in (None, Picky()):
-        kept = planner(arm, estimator, random_state=0)
+        kept = planner(arm, estimator, k=3, random_state=0)
         result = kept.plan(start, goal)
 try:
     BiasedRRT(arm, Picky(), k=np.inf, max_iterations=50).plan(start, -goal)
