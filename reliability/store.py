@@ -75,7 +75,8 @@ class ResumableStore:
         description: dict[str, Any],
         adopt: tuple[str, ...] = (),
     ) -> None:
-        self.folder = Path(folder)
+        # Workers may have been started in another working directory.
+        self.folder = Path(folder).absolute()
         if self.folder.exists() and not self.folder.is_dir():
             raise StoreError(f"{self.folder} must be a folder, and is a file.")
         self.folder.mkdir(parents=True, exist_ok=True)

@@ -65,6 +65,14 @@ def test_a_collection_with_a_path_gives_the_same(whole, tmp_path):
     assert_equal(collect(Disc(), path=tmp_path / "data"), whole)
 
 
+def test_a_relative_path_is_of_the_folder_that_the_caller_is_in(tmp_path, monkeypatch):
+    collect(Disc(), 4, n_jobs=2)  # Starts workers, which stay where they were started.
+    monkeypatch.chdir(tmp_path)
+    data = collect(Disc(), 4, n_jobs=2, path="data")
+    assert len(list((tmp_path / "data").glob("*.item"))) == 4
+    assert_equal(collect(Disc(), 4, path=tmp_path / "data"), data)
+
+
 @pytest.mark.parametrize(("stopped_at", "n_jobs"), [(0, 1), (7, 2), (39, 1)])
 def test_interrupted_at_any_plan_it_keeps_all_finished_plans_and_ends_with_the_same_bytes(
     tmp_path, stopped_at, n_jobs
