@@ -110,9 +110,13 @@ def test_the_page_on_what_did_not_help_can_be_followed(tmp_path, monkeypatch, ca
     [
         "README.md",
         "CONTRIBUTING.md",
+        "docs/acceptance.md",
+        "docs/classifiers.md",
+        "docs/execution.md",
         "docs/features.md",
         "docs/it_did_not_help.md",
         "docs/labels.md",
+        "docs/plan_worth.md",
         "examples/README.md",
     ],
 )
