@@ -17,7 +17,7 @@ SCENE = "simple_hook"
 SEED = 1
 MODELS = Path(__file__).parents[1] / "benchmarks" / "rope" / "models"
 
-classifier = load_estimator(MODELS / "rope_ours.joblib")
+classifier = load_estimator(MODELS / "rope_ours.skops")
 # This classifier reads how far the obstacles are below the band, the space where the rope hangs.
 rope = Rope(SCENE, features=classifier.provenance_["features"])
 

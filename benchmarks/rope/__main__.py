@@ -53,7 +53,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Plan, execute and draw."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scene", nargs="?", default="simple_hook", choices=SCENE_NAMES)
-    parser.add_argument("--model", type=Path, default=MODELS / "rope_ours.joblib")
+    parser.add_argument("--model", type=Path, default=MODELS / "rope_ours.skops")
     parser.add_argument("--features", default="voxels", help="of a model that doesn't say")
     parser.add_argument("--engine", choices=("mujoco", "pybullet"), default="mujoco")
     parser.add_argument("--plans", type=int, default=10, help="seeds to try at most")

@@ -6,8 +6,7 @@ limit and its execution ends within 0.025 m of the goal. Each finished trial is 
 ``--out``, in a folder per column: a run that was interrupted goes on where it stopped, and one with
 another planner is refused there. Columns are ``none`` and ``pbd``,
 without a classifier and without or with PBD ropes, models that come with the examples
-(``paper``, ``ours``, ``vector``), or the joblib file of any fitted estimator of the rope's
-features.
+(``paper``, ``ours``, ``vector``), or the file of any fitted estimator of the rope's features.
 """
 
 from __future__ import annotations
@@ -30,9 +29,9 @@ MODELS = Path(__file__).with_name("models")
 UNCLASSIFIED = {"none": "voxels", "pbd": "clearance"}
 COLUMNS = {
     **dict.fromkeys(UNCLASSIFIED),
-    "paper": MODELS / "rope_paper.joblib",
-    "ours": MODELS / "rope_ours.joblib",
-    "vector": MODELS / "rope_vector.joblib",
+    "paper": MODELS / "rope_paper.skops",
+    "ours": MODELS / "rope_ours.skops",
+    "vector": MODELS / "rope_vector.skops",
 }
 # Successes of 30, planning and smoothing seconds, without a classifier and with VoxNet.
 PAPER = {
@@ -49,7 +48,7 @@ PAPER = {
 def main(arguments: list[str] | None = None) -> None:
     """Run the trials that are missing and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--columns", nargs="+", default=["none"], help="names or joblib files")
+    parser.add_argument("--columns", nargs="+", default=["none"], help="names or files")
     parser.add_argument(
         "--features",
         choices=("voxels", "clearance", "vector"),

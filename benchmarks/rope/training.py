@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
 from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.model_selection import GroupShuffleSplit, ShuffleSplit
@@ -29,6 +27,7 @@ from reliability import (
     VoxNet,
     __version__,
     learn_in_rounds,
+    save_estimator,
 )
 from systems import Rope, load_scene
 from systems.rope.features.clearance import mirrored, reversed_ends
@@ -55,22 +54,16 @@ def train_all(folder: Path, models: Path, n_plans: int, n_jobs: int) -> None:
     n_plans : int
         In Simple Hook for the paper's models, and in each round for ours.
     models : Path
-        For ``rope_paper.joblib``, ``rope_vector.joblib`` and ``rope_ours.joblib``.
+        For ``rope_paper.skops``, ``rope_vector.skops`` and ``rope_ours.skops``.
     n_jobs : int
         Processes that collect.
     """
+    models.mkdir(parents=True, exist_ok=True)
     simple_hook = of_bands(collect_simple_hook(folder, n_plans, n_jobs))
-    save(train_vector(simple_hook), models / "rope_vector.joblib")
-    save(train_ours(folder, n_plans, n_jobs), models / "rope_ours.joblib")
-    save(train_paper(simple_hook, folder / "voxnet.checkpoint"), models / "rope_paper.joblib")
-
-
-def save(estimator: Any, path: Path) -> None:
-    """Write an estimator, small."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".partial")
-    joblib.dump(estimator, partial, compress=("xz", 6))
-    os.replace(partial, path)
+    save_estimator(train_vector(simple_hook), models / "rope_vector.skops")
+    save_estimator(train_ours(folder, n_plans, n_jobs), models / "rope_ours.skops")
+    paper = train_paper(simple_hook, folder / "voxnet.checkpoint")
+    save_estimator(paper, models / "rope_paper.skops")
 
 
 def train_paper(simple_hook: Transitions, checkpoint: Path) -> Any:
