@@ -65,6 +65,12 @@ class Rollout:
     n_completed: int
     stop_reason: Enum
 
+    def __repr__(self) -> str:
+        return (
+            f"Rollout({len(self.states)} states, {self.n_completed} commands completed, "
+            f"{self.stop_reason.name})"
+        )
+
 
 class System(ABC):
     """A robot in one scene (the paper's environment E): its true execution and a reduced model.

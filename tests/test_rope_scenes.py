@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 
 from planners import BiasedRRT
-from systems import Rope, random_rope_scene
+from systems import Car, Rollout, Rope, StopReason, random_rope_scene
 from systems.rope.catenary import hanging_rope
 from systems.rope.obstacles.shapes import Box
 from systems.rope.obstacles.signed_distance import signed_distance
@@ -222,3 +222,13 @@ def test_a_catenary_is_a_catenary_and_the_same_from_either_end(span, length):
     growth = np.diff(slopes)[5:-5]
     np.testing.assert_allclose(growth, growth.mean(), rtol=1e-2)
     assert growth.mean() > 0.0, "it sags"
+
+
+def test_scenes_ropes_and_rollouts_are_shown_in_a_line():
+    rope = Rope("simple_hook", features="clearance")
+    shown = repr(rope.scene)
+    assert shown == "Scene('simple_hook', 7 obstacles, rope_length=0.76, max_stretch=1.15)"
+    assert repr(rope) == "Rope('simple_hook', engine='mujoco', features='clearance')"
+    rollout = Rollout([0, 1, 2], 1, StopReason.CONSTRAINT)
+    assert repr(rollout) == "Rollout(3 states, 1 commands completed, CONSTRAINT)"
+    assert repr(Car()).startswith(f"Car({len(Car().scene.obstacles)} obstacles, bounds=(")

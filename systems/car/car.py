@@ -105,6 +105,9 @@ class Car(System):
         x_min, y_min, x_max, y_max = scene.bounds
         self.bounds = np.array([[x_min, y_min, -np.pi], [x_max, y_max, np.pi]])
 
+    def __repr__(self) -> str:
+        return f"Car({len(self.scene.obstacles)} obstacles, bounds={self.scene.bounds})"
+
     def reduce(self, state: Any) -> Array:
         """Return the pose of a true state, its heading in [-π, π): r."""
         return wrap_columns(as_finite_array(state, "state", (5,))[:3], self.angular)

@@ -103,6 +103,10 @@ class Rope(System):
         self._pbd_model = pbd_model(scene)
         self._execution = RopeRollout(scene, engine)
 
+    def __repr__(self) -> str:
+        scene, kind = self.scene.name, self.feature_kind
+        return f"Rope({scene!r}, engine={self.engine!r}, features={kind!r})"
+
     def reduce(self, state: RopeState) -> Array:
         """Pull the rope taut: r. PBD ropes begin where the rope is, at rest.
 

@@ -88,6 +88,12 @@ class Scene:
         _check_start(self)
         _check_goal(self)
 
+    def __repr__(self) -> str:
+        return (
+            f"Scene({self.name!r}, {len(self.obstacles)} obstacles, "
+            f"rope_length={self.rope_length:g}, max_stretch={self.max_stretch:g})"
+        )
+
     @cached_property
     def packed(self) -> Array:
         """The obstacles as the table that distances are computed from, shape (n, 8)."""
