@@ -24,6 +24,7 @@ from reliability.item_files import (
     digest_of,
     put,
 )
+from reliability.orphans import end_with_parent
 
 FORMAT_VERSION = 2
 _MANIFEST = "manifest.json"
@@ -211,6 +212,7 @@ def run_jobs(
 def _run(
     i: int, name: str, compute: Callable[[], Item], files: ItemFiles | None
 ) -> tuple[int, Item | None]:
+    end_with_parent()
     if files is None:
         return i, compute()
     # Another process may have made it since this one looked.

@@ -5,7 +5,9 @@ import signal
 import subprocess
 import sys
 import textwrap
+import time
 
+import psutil
 import pytest
 
 
@@ -183,3 +185,35 @@ def test_a_collection_that_was_killed_goes_on_and_ends_with_the_same_bytes(tmp_p
     ]
     assert contents[0] == contents[1]
     assert len(contents[0]) == 24 + 1
+
+
+ENDLESS = """
+import os, sys, time
+from pathlib import Path
+from planners import BiasedRRTConnect
+from reliability import collect_transitions
+from toy_systems import Disc
+
+class Endless(Disc):
+    def rollout(self, state, commands):
+        (Path(sys.argv[1]) / str(os.getpid())).touch()
+        time.sleep(600)
+
+collect_transitions(Endless(), BiasedRRTConnect(None), 24, n_jobs=2, random_state=1)
+"""
+
+
+def test_workers_end_when_the_process_that_they_work_for_is_killed(tmp_path):
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    command = [sys.executable, "-c", ENDLESS, str(tmp_path)]
+    with subprocess.Popen(command, env=environment) as parent:
+        workers = []
+        while len(workers) < 2 and parent.poll() is None:
+            time.sleep(0.1)
+            workers = [psutil.Process(int(file.name)) for file in tmp_path.iterdir()]
+        parent.kill()
+    assert len(workers) == 2
+    _, alive = psutil.wait_procs(workers, timeout=30)
+    for worker in alive:
+        worker.kill()
+    assert not alive
