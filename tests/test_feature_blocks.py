@@ -156,6 +156,47 @@ def test_distances_from_a_model_are_those_of_its_fixed_geoms(scene, rng):
     assert without_floor(points[:0]).shape == (0, 5)
 
 
+KINDS = """
+<mujoco>
+  <asset><mesh name="wedge" vertex="0 0 0  1 0 0  0 1 0  0 0 1  1 1 0.5"/></asset>
+  <worldbody>
+    <geom type="plane" size="5 5 1" pos="0 0 -2" euler="10 20 0"/>
+    <geom type="sphere" size="0.4" pos="1 1 1"/>
+    <geom type="capsule" size="0.2 0.5" pos="-1 1 0" euler="30 40 50"/>
+    <geom type="cylinder" size="0.3 0.6" pos="1 -1 0" euler="50 -20 10"/>
+    <geom type="box" size="0.3 0.5 0.7" pos="-1 -1 1" euler="15 75 -35"/>
+    <geom type="ellipsoid" size="0.3 0.5 0.7" pos="0 0 2" euler="15 75 -35"/>
+    <geom type="mesh" mesh="wedge" pos="2 0 2" euler="10 10 10"/>
+    <body mocap="true" name="probe"><geom name="probe" type="sphere" size="0.001"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_all_kinds_of_geom_are_measured_as_by_mujoco(tmp_path, rng):
+    import mujoco
+
+    file = tmp_path / "kinds.xml"
+    file.write_text(KINDS)
+    points = rng.uniform(-2, 3, size=(300, 3))
+    found = MujocoObstacles(file, ignore=["probe"])(points)
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    probe = model.geom("probe").id
+    expected = []
+    for point in points:
+        data.mocap_pos[0] = point
+        mujoco.mj_kinematics(model, data)
+        gaps = [
+            mujoco.mj_geomDistance(model, data, probe, geom, 100, None)
+            for geom in range(model.ngeom)
+            if geom != probe
+        ]
+        expected.append(min(gaps) + 0.001)
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+    assert (found < -0.01).any()
+
+
 def test_planar_points_are_measured_at_a_height(scene, rng):
     points = rng.uniform(-1, 3, size=(30, 2))
     low = MujocoObstacles(scene, ignore=["floor"], height=0.4)

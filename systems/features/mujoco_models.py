@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from systems.features.primitive_kernels import PRIMITIVES
+
 PROBE_RADIUS = 1e-3
 OBSTACLE_GROUP = 0
 _PROBE = "probe of systems.features"
@@ -24,18 +26,23 @@ class ModelMemory(NamedTuple):
     data : mujoco.MjData
     probe : int
         The geom of a small sphere, of ``PROBE_RADIUS`` metres.
-    obstacles : list of int
-        The geoms that are fixed to the world, without those to ignore.
-    centres : ndarray of shape (n_obstacles, 3)
-        Centres of spheres around the obstacles.
-    radii : ndarray of shape (n_obstacles,)
-        Their radii; infinite for planes.
+    primitives : tuple of ndarray
+        Of the obstacles that are planes, spheres, capsules, cylinders or boxes: what
+        :func:`systems.features.primitive_kernels.nearest_primitive` takes beside the points.
+        Obstacles are the geoms that are fixed to the world, without those to ignore.
+    others : list of int
+        Obstacles of other kinds, such as meshes.
+    centres : ndarray of shape (n_others, 3)
+        Centres of spheres around the others.
+    radii : ndarray of shape (n_others,)
+        Their radii.
     """
 
     model: Any
     data: Any
     probe: int
-    obstacles: list[int]
+    primitives: tuple[NDArray[Any], ...]
+    others: list[int]
     centres: NDArray[np.float64]
     radii: NDArray[np.float64]
 
@@ -81,10 +88,24 @@ def _read(path: str, ignore: tuple[str, ...]) -> ModelMemory:
     _show_to_rays(model, obstacles)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    planes = model.geom_type[obstacles] == mujoco.mjtGeom.mjGEOM_PLANE
-    radii = np.where(planes, np.inf, model.geom_rbound[obstacles])
-    centres = data.geom_xpos[obstacles]
-    return ModelMemory(model, data, model.geom(_PROBE).id, obstacles, centres, radii)
+    is_primitive = np.isin(model.geom_type, PRIMITIVES)
+    simple = [i for i in obstacles if is_primitive[i]]
+    primitives = (
+        model.geom_type[simple].astype(np.int64),
+        data.geom_xpos[simple],
+        data.geom_xmat[simple].reshape(-1, 3, 3),
+        model.geom_size[simple],
+    )
+    others = [i for i in obstacles if not is_primitive[i]]
+    return ModelMemory(
+        model=model,
+        data=data,
+        probe=model.geom(_PROBE).id,
+        primitives=primitives,
+        others=others,
+        centres=data.geom_xpos[others],
+        radii=model.geom_rbound[others],
+    )
 
 
 def _obstacles(model: Any, ignore: tuple[str, ...]) -> list[int]:

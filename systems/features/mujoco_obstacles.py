@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from systems.features.mujoco_models import OBSTACLE_GROUP, PROBE_RADIUS, ModelMemory, thread_model
+from systems.features.primitive_kernels import nearest_primitive
 
 Array = NDArray[np.float64]
 N_GROUPS = 6
@@ -70,13 +71,15 @@ class MujocoObstacles:
         Returns
         -------
         distances : ndarray of shape (...)
-            In metres, negative inside an obstacle (MuJoCo before 3.2.7 may say 0 there); infinite
-            where there are no obstacles.
+            In metres, negative inside an obstacle (of meshes, MuJoCo before 3.2.7 may say 0
+            there); infinite where there are no obstacles.
         """
         places = self._in_space(points)
         flat = places.reshape(-1, 3)
         memory = thread_model(self.model_file, self.ignore)
-        distances = _distances(memory, flat) if memory.obstacles else np.full(len(flat), np.inf)
+        distances = nearest_primitive(flat, *memory.primitives)
+        if memory.others:
+            distances = _or_nearer(distances, memory, flat)
         return distances.reshape(places.shape[:-1])
 
     def cast(self, origins: Array, rays: Array, reach: float) -> Array:
@@ -125,20 +128,18 @@ def _widened(points: Array, z: float) -> Array:
     return np.concatenate([points, np.full((*points.shape[:-1], 1), z)], axis=-1)
 
 
-def _distances(memory: ModelMemory, points: Array) -> Array:
-    """Return the signed distance of points, (n, 3), from the nearest of at least one obstacle."""
+def _or_nearer(distances: Array, memory: ModelMemory, points: Array) -> Array:
+    """Return the distances of points, (n, 3), from obstacles that are no primitives, if nearer."""
     from mujoco import mj_geomDistance
 
-    model, data, probe, obstacles, centres, radii = memory
     # No obstacle is nearer than the sphere around it: most need not be measured.
-    least = np.linalg.norm(points[:, None] - centres, axis=2) - radii - PROBE_RADIUS
-    position = data.geom_xpos[probe]
-    distances = np.empty(len(points))
-    for i, (first, bounds) in enumerate(zip(least.argmin(axis=1), least.tolist(), strict=True)):
-        position[:] = points[i]
-        nearest = mj_geomDistance(model, data, probe, obstacles[first], FAR, None)
-        for obstacle, bound in zip(obstacles, bounds, strict=True):
-            if bound < nearest:
-                nearest = min(nearest, mj_geomDistance(model, data, probe, obstacle, FAR, None))
-        distances[i] = nearest
-    return distances + PROBE_RADIUS
+    least = np.linalg.norm(points[:, None] - memory.centres, axis=2) - memory.radii
+    position = memory.data.geom_xpos[memory.probe]
+    for i, j in zip(*np.nonzero(least < distances[:, None]), strict=True):
+        if least[i, j] < distances[i]:
+            position[:] = points[i]
+            found = mj_geomDistance(
+                memory.model, memory.data, memory.probe, memory.others[j], FAR, None
+            )
+            distances[i] = min(distances[i], found + PROBE_RADIUS)
+    return distances
