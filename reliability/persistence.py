@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import joblib
+import sklearn
 
 from reliability.model_checks import check_model
 from reliability.model_files import ModelFileError, read_model, write_model
@@ -103,6 +104,12 @@ def _load_joblib(path: Path) -> Any:
     except (ModelFileError, FileNotFoundError):
         raise
     except (ImportError, AttributeError) as error:
+        if _is_of_sklearn(error):
+            raise ModelFileError(
+                f"{path} was saved with another version of scikit-learn than that installed here, "
+                f"{sklearn.__version__} ({error}). Install the version that saved it, or train "
+                "and save the model again."
+            ) from error
         raise ModelFileError(
             f"{path} needs something that can't be imported here ({error}); install it, or move "
             "the class out of the script or notebook that saved the model."
@@ -112,3 +119,11 @@ def _load_joblib(path: Path) -> Any:
             f"{path} is truncated or no joblib file ({error!r}); copy it again, or train and save "
             "the model again."
         ) from error
+
+
+def _is_of_sklearn(error: ImportError | AttributeError) -> bool:
+    """Say whether something is missing that scikit-learn had, or called, by another name."""
+    if isinstance(error, AttributeError):
+        return "sklearn" in str(error)
+    # Up to scikit-learn 1.8, pickles name its compiled losses without their package.
+    return error.name == "_loss" or (error.name or "").startswith("sklearn")

@@ -81,6 +81,13 @@ def test_files_that_need_what_is_not_here_are_refused(tmp_path):
         load_estimator(tmp_path / "model.joblib")
 
 
+@pytest.mark.parametrize("module", ["_loss", "sklearn.of_the_past"])
+def test_files_of_another_scikit_learn_say_so(module, tmp_path):
+    (tmp_path / "model.joblib").write_bytes(f"c{module}\nCyHalfBinomialLoss\n.".encode())
+    with pytest.raises(ModelFileError, match="saved with another version of scikit-learn"):
+        load_estimator(tmp_path / "model.joblib")
+
+
 def test_a_missing_file_is_missing(tmp_path):
     with pytest.raises(FileNotFoundError):
         load_estimator(tmp_path / "absent.joblib")

@@ -250,12 +250,13 @@ def test_no_commands_leave_the_state_as_it_is(engine):
 @every_engine
 @pytest.mark.parametrize("speed", [1e3, 1e12])
 def test_divergence_is_an_error_of_its_own(engine, speed, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log of its warnings
+    monkeypatch.chdir(tmp_path)  # MuJoCo by itself writes a log of its warnings there
     rollout = rollout_of("simple_hook", engine)
     commands, whole = executed("simple_hook", engine, "free")
     with pytest.raises(SimulationDivergedError):
         rollout.execute(with_all_speeds(rollout, whole.states[0], speed), commands)
     assert_same(rollout.execute(whole.states[0], commands[:5]).states, whole.states[:6])
+    assert not list(tmp_path.iterdir())
 
 
 @every_engine

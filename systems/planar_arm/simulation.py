@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from systems.errors import SimulationDivergedError
+from systems.mujoco_warnings import log_warnings
 from systems.system import Array
 
 MODEL_FILE = Path(__file__).with_name("planar_arm.xml")
@@ -31,6 +32,7 @@ class ArmSimulation:
     """MuJoCo's model of the arm, and the memory that it simulates in."""
 
     def __init__(self) -> None:
+        log_warnings()
         self._model = mujoco.MjModel.from_xml_path(str(MODEL_FILE))
         self._data = mujoco.MjData(self._model)
 

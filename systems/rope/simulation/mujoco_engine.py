@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from systems.errors import SimulationDivergedError
+from systems.mujoco_warnings import log_warnings
 from systems.rope.obstacles.mjcf import geom_xml, numbers_xml
 from systems.rope.obstacles.shapes import Array, Obstacle
 from systems.rope.scene import ROPE_RADIUS
@@ -43,6 +44,7 @@ class MujocoRope:
     def __init__(self, obstacles: Sequence[Obstacle], n_nodes: int, spacing: float) -> None:
         import mujoco
 
+        log_warnings()
         self._mujoco = mujoco
         self._rest = np.zeros((n_nodes, 3))
         self._rest[:, 0] = spacing * np.arange(n_nodes)
