@@ -89,9 +89,10 @@ def test_settling_ends_at_rest(arm):
 
 
 def test_divergence_is_an_error_of_its_own(arm, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log where it runs.
+    monkeypatch.chdir(tmp_path)  # MuJoCo by itself writes a log where it runs.
     with pytest.raises(SimulationDivergedError, match="diverged when"):
         arm.rollout([1e11, 0, 0], [[0.0, 0, 0]])
+    assert not list(tmp_path.iterdir())
 
 
 @given(configurations, configurations)
