@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rope_states import band_points, pbd_nodes, polyline_length, resample_bands, slow_margin
+from rope_states import (
+    band_points,
+    pbd_nodes,
+    plain_resample,
+    polyline_length,
+    resample_bands,
+    slow_margin,
+)
 
 from systems import Box, Capsule, Cylinder, Rope, Scene
 from systems.errors import SimulationDivergedError
@@ -219,14 +226,8 @@ def test_the_rope_with_more_friction_slides_later(scene):
     scene = Scene([bar], BOUNDS, LENGTH, START - np.array([0.3, 0.0, 0.0]), GOAL)
     rope = Rope(scene, features="clearance")
     ends = np.array([[-0.2, 0.35, -0.25], [-0.2, -0.35, -0.25]])
-    laid = np.concatenate(
-        [
-            np.linspace(ends[0], [-0.2, 0.05, -0.055], 20)[:-1],
-            np.linspace([-0.2, 0.05, -0.055], [-0.2, -0.05, -0.055], 3)[:-1],
-            np.linspace([-0.2, -0.05, -0.055], ends[1], 20),
-        ]
-    )
-    nodes = np.array([laid[round(i)] for i in np.linspace(0, len(laid) - 1, scene.n_nodes)])
+    laid = np.array([ends[0], [-0.2, 0.05, -0.055], [-0.2, -0.05, -0.055], ends[1]])
+    nodes = plain_resample(laid, scene.n_nodes)
     row = rope.reduce(RopeState(ends, nodes))[None]
     still, along = np.zeros((1, 6)), np.tile([0.01, 0.0, 0.0], 2)[None]
     for command in [still] * 40 + [along] * 12:
