@@ -82,17 +82,19 @@ class CheckTransition:
         -------
         accepted : ndarray of bool of shape (n,)
         """
-        cost = np.zeros(len(reduced))
+        probability = None
         if self._acceptance.needs_cost:
             accepted, probability = self.evaluate(reduced, next_reduced)
-            cost = negative_log_likelihood(probability)
         else:
             accepted = self.classify(reduced, next_reduced)
         n_reliable = int(np.count_nonzero(accepted))
         n_unreliable = len(accepted) - n_reliable
         if n_unreliable:
             unreliable = ~accepted
-            accepted[unreliable] = self._acceptance.draw(cost[unreliable])
+            cost = np.zeros(n_unreliable)
+            if probability is not None:
+                cost = negative_log_likelihood(probability[unreliable])
+            accepted[unreliable] = self._acceptance.draw(cost)
             n_lucky = int(np.count_nonzero(accepted)) - n_reliable
             self.n_accepted_unreliable += n_lucky
             self.n_rejected += n_unreliable - n_lucky
