@@ -6,8 +6,8 @@ Both take the same code with the same parameters; only the features are their ow
 - *none*: plan with the reduced model alone.
 - *0.1*: README's road as it was in version 0.1: collect plans, label them by Eq. 3, train the
   default network for 25 epochs, plan with k = 1.
-- *new*: learn in rounds from executed labels, plan with k = 10, calibrate on executed plans how
-  likely a plan is to go well, and make ten plans of which the likeliest is carried out.
+- *new*: learn in rounds, plan with k = 10, calibrate on executed plans how likely a plan is to go
+  well, and make ten plans of which the likeliest is carried out.
 - *new, one plan*: the same without the calibration and without planning again.
 - *new, replanning*: as new, and plan again from where the system is when it leaves its plan.
 
@@ -99,7 +99,6 @@ class Experiment:
             n_rounds=N_ROUNDS,
             n_plans=for_rounds // N_ROUNDS,
             n_validation=round(SHARE_OF_VALIDATION * self.n_plans) // N_ROUNDS,
-            labels="executed",
             n_jobs=self.n_jobs,
             random_state=self.first_seed,
             path=self.folder / "rounds",

@@ -20,6 +20,11 @@ _MOST_LISTED = 8
 _MOST_WARNINGS = 5
 
 
+def mostly_diverged(labels: Any) -> bool:
+    """Say whether most of the labels of a :class:`Summary` only say that a plan had diverged."""
+    return bool(labels.unreliable_share * labels.already_diverged_share > _MOSTLY_DIVERGED)
+
+
 def label_warnings(labels: Any) -> list[str]:
     """Say what the labels alone show to be wrong, most important first."""
     if labels.base_rate == 1:
@@ -27,7 +32,7 @@ def label_warnings(labels: Any) -> list[str]:
     warnings = []
     if labels.n_plans_of_rarer_label < FEW_PLANS:
         warnings.append(_few_plans(labels))
-    if labels.unreliable_share * labels.already_diverged_share > _MOSTLY_DIVERGED:
+    if mostly_diverged(labels):
         warnings.append(f"{_already_diverged(labels)}.")
     return warnings
 

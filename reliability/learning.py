@@ -78,9 +78,9 @@ def learn_in_rounds(
     n_rounds: int,
     n_plans: int | Sequence[int],
     n_validation: int = 100,
-    labels: str = "executed",
+    labels: str = "plan",
     exploring_k: float = 6.0,
-    n_after: int = 1,
+    n_after: int | None = None,
     on_error: str = "raise",
     path: str | os.PathLike[str] | None = None,
     n_jobs: int | None = None,
@@ -121,18 +121,19 @@ def learn_in_rounds(
     n_validation : int, default=100
         Problems that each round's estimator plans at its end. With 100, two estimators that
         succeed equally often in the long run differ by up to 10 or so by chance.
-    labels : {"executed", "plan", "both"}, default="executed"
-        As in :func:`collect_transitions`. "executed" labels each command by what g predicts from
-        where the true system was, so that a plan that goes wrong early gives labels to its end.
-        "plan" gives the labels of the paper.
+    labels : {"plan", "executed", "both"}, default="plan"
+        As in :func:`collect_transitions`. "plan" gives the labels of the paper. "executed" labels
+        each command by what g predicts from where the true system was.
     exploring_k : float, default=6.0
         ``k`` of the planner from round 1 on. Not infinite, so that plans also go where the
         estimator is wrong, and the next round finds out. Little hangs on it: 1, 3, 6, 10 and
         infinity gave 150, 139, 142, 148 and 141 successes of 200 on both of
         ``examples/own_systems`` together, which is chance.
-    n_after : int, default=1
+    n_after : int, default=None
         How many of a plan's Unreliable transitions in a row to learn from, where labels are of
-        "plan": see :meth:`Transitions.trim_unreliable_runs`.
+        "plan": see :meth:`Transitions.trim_unreliable_runs`. None learns from the first alone if,
+        in round 0, more than two thirds of the labels only say that the plan had diverged before,
+        and from all otherwise. ``docs/labels.md`` has what that is worth.
     on_error : {"raise", "skip"}, default="raise"
         As in :func:`collect_transitions`. A plan that is left out has not succeeded.
     path : path-like, default=None

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from reliability.advice import mostly_diverged
 from reliability.collect import ON_ERROR, check_choice, execute_plans, joined
 from reliability.fitting import FitTask, LabelledPlans, balanced_accuracy, correct, unpickled
 from reliability.identity import describe, describe_planner
@@ -27,6 +28,7 @@ from reliability.round_report import (
 )
 from reliability.scenes import SceneArgument, SceneFamily
 from reliability.store import Job, ResumableStore, run_jobs
+from reliability.summary import Summary
 from reliability.transitions import Transitions
 from systems.validation import RandomState, as_seed, check_count, check_number
 
@@ -121,7 +123,7 @@ class Recipe:
     n_validation: int
     labels: str
     exploring_k: float
-    n_after: int
+    n_after: int | None
     on_error: str
 
     def check(self) -> None:
@@ -145,7 +147,8 @@ class Recipe:
         check_count(self.n_validation, "n_validation")
         check_choice(self.labels, "labels", LABELS)
         check_number(self.exploring_k, "exploring_k", 0, np.inf)
-        check_count(self.n_after, "n_after")
+        if self.n_after is not None:
+            check_count(self.n_after, "n_after")
         check_choice(self.on_error, "on_error", ON_ERROR)
 
     def describe(self) -> dict[str, Any]:
@@ -156,7 +159,7 @@ class Recipe:
             "estimator": describe(self.estimator),
             "labels": self.labels,
             "n_plans": _without_repeats(self.n_plans),
-            "n_after": int(self.n_after),
+            "n_after": None if self.n_after is None else int(self.n_after),
         }
 
     def next_round(self, done: list[Round], folder: Folder) -> Round:
@@ -171,7 +174,7 @@ class Recipe:
             folder,
         )
         transitions = self._transitions(items, done, folder.verbose)
-        rows = transitions.trim_unreliable_runs(self.n_after)
+        rows = self._informative(transitions, done[0].transitions if done else transitions)
         of_round = LabelledPlans(rows.features(self.system), rows.y, rows.plan)
         data = _stacked([*(one.rows for one in done), of_round])
         task = FitTask(self.estimator, data, for_fit, folder.n_jobs)
@@ -190,6 +193,14 @@ class Recipe:
             seconds=time.perf_counter() - began,
         )
         return Round(transitions, of_round, estimator, succeeded, report)
+
+    def _informative(self, transitions: Transitions, of_round_0: Transitions) -> Transitions:
+        """Return the transitions to learn from."""
+        if self.n_after is not None:
+            return transitions.trim_unreliable_runs(self.n_after)
+        if mostly_diverged(Summary.of(of_round_0)):
+            return transitions.trim_unreliable_runs(1)
+        return transitions
 
     def _exploring(self, estimator: Any) -> Planner:
         planner: Any = copy.copy(self.planner)

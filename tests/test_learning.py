@@ -470,6 +470,22 @@ def test_only_the_first_mistakes_that_end_a_plan_are_learned():
     np.testing.assert_array_equal(expected.predict(X), result.estimator.predict(X))
 
 
+class Tires(Disc):
+    """Carries out two commands of a plan, and all that follow by a fifth."""
+
+    def rollout(self, state, commands):
+        slower = np.where(np.arange(len(commands)) < 2, 1.0, 0.2)[:, None]
+        return super().rollout(state, commands * slower)
+
+
+@pytest.mark.parametrize(("system", "n_after"), [(Disc(), 10**6), (Tires(), 1)])
+def test_by_default_labels_that_only_say_diverged_are_left_out_where_they_are_most(system, n_after):
+    result = learn(system=system, n_rounds=2, labels="plan")
+    trimmed = result.transitions.trim_unreliable_runs(n_after)
+    assert result.rounds[-1].n_learned == len(trimmed)
+    assert (len(trimmed) < len(result.transitions)) == (n_after == 1)
+
+
 def test_rounds_may_differ_in_how_many_plans_they_make(whole, tmp_path):
     result = learn(n_plans=(N_PLANS, N_PLANS, 12), path=tmp_path)
     assert [report.n_plans for report in result.rounds] == [N_PLANS, N_PLANS, 12]
