@@ -37,7 +37,7 @@ TREE = DecisionTreeClassifier(max_depth=4, max_features=1)
 def learn(estimator=TREE, system=None, k=1.0, **parameters):
     planner = BiasedRRTConnect(None, k=k, max_iterations=300)
     defaults = {"n_rounds": 3, "n_plans": N_PLANS, "n_validation": N_VALIDATION}
-    defaults |= {"exploring_k": K, "random_state": SEED}
+    defaults |= {"labels": "executed", "n_after": 1, "exploring_k": K, "random_state": SEED}
     return learn_in_rounds(estimator, planner, system or Disc(), **defaults | parameters)
 
 
@@ -480,7 +480,10 @@ class Tires(Disc):
 
 @pytest.mark.parametrize(("system", "n_after"), [(Disc(), 10**6), (Tires(), 1)])
 def test_by_default_labels_that_only_say_diverged_are_left_out_where_they_are_most(system, n_after):
-    result = learn(system=system, n_rounds=2, labels="plan")
+    planner = BiasedRRTConnect(None, max_iterations=300)
+    sizes = {"n_rounds": 2, "n_plans": N_PLANS, "n_validation": N_VALIDATION}
+    result = learn_in_rounds(TREE, planner, system, **sizes, random_state=SEED)
+    assert not result.transitions.executed.any()
     trimmed = result.transitions.trim_unreliable_runs(n_after)
     assert result.rounds[-1].n_learned == len(trimmed)
     assert (len(trimmed) < len(result.transitions)) == (n_after == 1)
