@@ -116,6 +116,7 @@ def test_the_page_on_what_did_not_help_can_be_followed(tmp_path, monkeypatch, ca
         "docs/features.md",
         "docs/it_did_not_help.md",
         "docs/labels.md",
+        "docs/messages.md",
         "docs/plan_worth.md",
         "examples/README.md",
     ],
