@@ -51,7 +51,7 @@ def as_table(X: NDArray[Any], names: Sequence[str]) -> Any:
         from pandas import DataFrame
     except ImportError as error:
         raise ImportError("Tables of features are pandas DataFrames: install pandas.") from error
-    return DataFrame(X, columns=list(names), copy=False)
+    return DataFrame(X, columns=list(names))
 
 
 def columns_to_ask(

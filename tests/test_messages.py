@@ -35,7 +35,13 @@ def test_nothing_is_printed_unasked(capfd, tmp_path):
     execute(system, planner, problem, tolerance=0.1)
     evaluate(system, planner, 2, tolerance=0.1, random_state=0)
     learn_in_rounds(
-        LogisticRegression(), planner, system, n_rounds=1, n_plans=20, n_validation=2, random_state=0
+        LogisticRegression(),
+        planner,
+        system,
+        n_rounds=1,
+        n_plans=20,
+        n_validation=2,
+        random_state=0,
     )
     shown = capfd.readouterr()
     assert (shown.out, shown.err) == ("", "")

@@ -73,7 +73,13 @@ def test_what_has_a_table_is_shown_as_one():
     planner = BiasedRRTConnect(Disc(), max_iterations=100)
     evaluation = evaluate(Disc(), planner, 2, tolerance=0.1, random_state=0)
     learned = learn_in_rounds(
-        LogisticRegression(), planner, Disc(), n_rounds=1, n_plans=20, n_validation=2, random_state=0
+        LogisticRegression(),
+        planner,
+        Disc(),
+        n_rounds=1,
+        n_plans=20,
+        n_validation=2,
+        random_state=0,
     )
     for thing in (evaluation, Evaluation.compare({"one": evaluation}), learned):
         assert repr(thing) == str(thing)
