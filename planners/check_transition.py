@@ -66,6 +66,9 @@ class CheckTransition:
         self._counts = estimator is not None
         self._acceptance = make_acceptance(acceptance, estimator, k, accuracy, rng)
 
+    def __repr__(self) -> str:
+        return f"<CheckTransition: {self.n_checked} checked, {self.n_rejected} rejected>"
+
     @property
     def answers_fast(self) -> bool:
         """Whether a search may ask about single transitions, rather than about many at a time."""

@@ -83,6 +83,8 @@ class Comparison:
             )
         return "\n".join(lines)
 
+    __repr__ = __str__
+
     def _told_difference(self, name: str) -> str:
         only_this, only_first, p_value = self.differing(name)
         return f"{only_this:3d} : {only_first:d}  (p = {p_value:.2g})"

@@ -24,6 +24,9 @@ class EdgeChecker:
         self._check = check
         self._accepted: list[tuple[Array, Array, NDArray[np.bool_]]] = []
 
+    def __repr__(self) -> str:
+        return f"<EdgeChecker of {self._system!r}>"
+
     def accept(self, starts: Array, ends: Array) -> NDArray[np.bool_]:
         """Accept the edges of which g allows, and CheckTransition accepts, every transition.
 

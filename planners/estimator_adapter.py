@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -11,6 +11,8 @@ from sklearn.utils.validation import check_is_fitted
 
 from reliability.answer_checks import check_numbers, column_of_probabilities, is_label
 from reliability.labels import RELIABLE, UNRELIABLE
+from reliability.named_features import Columns, columns_to_ask
+from systems.features.names import feature_names
 from systems.system import Array, System
 
 if TYPE_CHECKING:
@@ -61,8 +63,7 @@ def adapt_estimator(system: System, estimator: Any) -> EstimatorAdapter:
     Raises
     ------
     ValueError
-        If the estimator lacks a method, has other classes, or was fitted on another number of
-        features.
+        If the estimator lacks a method, has other classes, or was fitted on other features.
     sklearn.exceptions.NotFittedError
         If the estimator is not fitted.
     """
@@ -70,7 +71,7 @@ def adapt_estimator(system: System, estimator: Any) -> EstimatorAdapter:
         return _Constant(True)
     classes = _checked_classes(estimator)
     meanings = _meanings(classes)
-    _check_n_features(system, estimator)
+    columns = _columns(system, estimator)
     if len(classes) == 1:
         return _Constant(meanings[0])
     # Importing scikit-learn's ensembles takes a second, which planning without them need not pay.
@@ -78,8 +79,8 @@ def adapt_estimator(system: System, estimator: Any) -> EstimatorAdapter:
 
     inference = compile_inference(estimator)
     if inference is None:
-        return _Public(system, estimator, classes, meanings.index(True))
-    return _Compiled(system, estimator, inference, meanings.index(True))
+        return _Public(system, columns, estimator, classes, meanings.index(True))
+    return _Compiled(system, columns, estimator, inference, meanings.index(True))
 
 
 def _answers_fast(estimator: Any) -> bool:
@@ -115,9 +116,14 @@ class _Compiled:
     """An estimator that is asked through :func:`reliability.compile_inference`."""
 
     def __init__(
-        self, system: System, estimator: Any, inference: CompiledInference, reliable: int
+        self,
+        system: System,
+        columns: Columns,
+        estimator: Any,
+        inference: CompiledInference,
+        reliable: int,
     ) -> None:
-        self._system = system
+        self._describe = _described_by(system, columns)
         self._source = f"{type(estimator).__name__}, compiled,"
         self._inference = inference
         self._reliable = reliable
@@ -139,7 +145,7 @@ class _Compiled:
         return self._inference.is_second(scores) == self._reliable
 
     def _scores(self, reduced: Array, next_reduced: Array) -> NDArray[Any]:
-        scores = self._inference.score(self._system.features(reduced, next_reduced))
+        scores = self._inference.score(self._describe(reduced, next_reduced))
         check_numbers(scores, self._source)
         return scores
 
@@ -149,12 +155,19 @@ class _Public:
 
     answers_fast = False
 
-    def __init__(self, system: System, estimator: Any, classes: list[Any], reliable: int) -> None:
+    def __init__(
+        self,
+        system: System,
+        columns: Columns,
+        estimator: Any,
+        classes: list[Any],
+        reliable: int,
+    ) -> None:
         self._system = system
+        self._columns = columns
         self._predict = estimator.predict
         self._predict_proba = getattr(estimator, "predict_proba", None)
         self._name = type(estimator).__name__
-        self._columns = getattr(estimator, "feature_names_in_", None)
         self._classes = classes
         self._reliable = reliable
 
@@ -188,16 +201,7 @@ class _Public:
         )
 
     def _rows(self, reduced: Array, next_reduced: Array) -> Any:
-        rows = self._system.features(reduced, next_reduced)
-        return rows if self._columns is None else self._with_names(rows)
-
-    def _with_names(self, rows: NDArray[Any]) -> Any:
-        """Return rows as the table that an estimator was fitted on, or it warns of lost names."""
-        try:
-            from pandas import DataFrame
-        except ImportError:
-            return rows
-        return DataFrame(rows, columns=self._columns)
+        return self._columns.of(self._system.features(reduced, next_reduced))
 
 
 def _checked_classes(estimator: Any) -> list[Any]:
@@ -229,12 +233,16 @@ def _means_reliable(label: Any) -> bool | None:
     return _NUMBERS.get(label)
 
 
-def _check_n_features(system: System, estimator: Any) -> None:
-    expected = getattr(estimator, "n_features_in_", None)
+def _columns(system: System, estimator: Any) -> Columns:
+    """Return which of the system's features the estimator is to be asked with."""
     state = np.zeros((1, system.reduced_dim))
-    given = system.features(state, state).shape[1]
-    if expected is not None and expected != given:
-        raise ValueError(
-            f"estimator was fitted on {expected} features, and {type(system).__name__} gives "
-            f"{given}; fit it on transitions of this system."
-        )
+    n_features = system.features(state, state).shape[1]
+    names = feature_names(system, n_features)
+    return columns_to_ask(estimator, names, n_features, type(system).__name__)
+
+
+def _described_by(system: System, columns: Columns) -> Callable[[Array, Array], NDArray[Any]]:
+    """Return what describes transitions in these columns, at no cost where they are all."""
+    if columns.order is None:
+        return system.features
+    return lambda reduced, following: columns.select(system.features(reduced, following))

@@ -18,7 +18,7 @@ from systems.system import Array
 _N_BINS = 5
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Evaluation:
     """What came of a planner's plans on unseen problems; entries are in the problems' order.
 
@@ -232,6 +232,8 @@ class Evaluation:
             if reasons
             else lines
         )
+
+    __repr__ = __str__
 
     def plot(self, axes: Any = None) -> Any:
         """Draw how executions ended, and success against ``success_probability``.

@@ -77,20 +77,24 @@ def _about_features(diagnosis: Any) -> Iterable[str]:
     constant = diagnosis.constant_features
     if 0 < len(constant) < len(diagnosis.feature_ranges):
         yield (
-            f"{_columns(constant)} the same value in all transitions: leave out of system.features "
-            "what tells nothing, or mend it if it should vary."
+            f"{_columns(diagnosis, constant)} the same value in all transitions: leave out of "
+            "system.features what tells nothing, or mend it if it should vary."
         )
     if diagnosis.duplicate_features:
-        pairs = [f"{later} equals {first}" for first, later in diagnosis.duplicate_features]
+        called = diagnosis.feature_names or range(len(diagnosis.feature_ranges))
+        pairs = [
+            f"{called[later]} equals {called[first]}"
+            for first, later in diagnosis.duplicate_features
+        ]
         yield (
             f"Some features are equal in all transitions ({_listed(pairs)}): leave one out, or "
             "mend it if they should differ."
         )
     if diagnosis.unscaled_features:
         yield (
-            f"{_columns(diagnosis.unscaled_features)} values far from order one, which a network "
-            "learns badly from: divide by a typical size in system.features, or put scikit-learn's "
-            "StandardScaler before the classifier in a Pipeline."
+            f"{_columns(diagnosis, diagnosis.unscaled_features)} values far from order one, which "
+            "a network learns badly from: divide by a typical size in system.features, or put "
+            "scikit-learn's StandardScaler before the classifier in a Pipeline."
         )
 
 
@@ -193,9 +197,10 @@ def _better_features() -> str:
     )
 
 
-def _columns(columns: tuple[int, ...]) -> str:
-    one = len(columns) == 1
-    return f"{'Feature' if one else 'Features'} {_listed(columns)} {'has' if one else 'have'}"
+def _columns(diagnosis: Any, columns: tuple[int, ...]) -> str:
+    called = diagnosis.feature_names or range(len(diagnosis.feature_ranges))
+    one, names = len(columns) == 1, [called[column] for column in columns]
+    return f"{'Feature' if one else 'Features'} {_listed(names)} {'has' if one else 'have'}"
 
 
 def _listed(things: Iterable[object]) -> str:

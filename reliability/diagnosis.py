@@ -20,7 +20,7 @@ from reliability.feature_columns import constant_columns, duplicate_columns, uns
 from reliability.labels import RELIABLE
 from reliability.scenes import SceneArgument
 from reliability.summary import Summary
-from reliability.transitions import Transitions
+from reliability.transitions import Transitions, named_features
 from reliability.unseen_plans import UnseenPredictions, predict_unseen
 from systems.validation import check_count
 
@@ -61,6 +61,9 @@ class Diagnosis:
         Columns that are equal: the first of them, and a later one.
     unscaled_features : tuple of int
         Columns of a size that a network learns badly from; none for other estimators.
+    feature_names : tuple of str or None
+        What the columns are called; None if the system does not say, and in warnings columns have
+        their numbers then.
     """
 
     labels: Summary
@@ -76,6 +79,7 @@ class Diagnosis:
     constant_features: tuple[int, ...]
     duplicate_features: tuple[tuple[int, int], ...]
     unscaled_features: tuple[int, ...]
+    feature_names: tuple[str, ...] | None
 
     @property
     def base_rate(self) -> float:
@@ -143,6 +147,7 @@ class Diagnosis:
         own["duplicate_features"] = [list(pair) for pair in self.duplicate_features]
         for name in ("constant_features", "unscaled_features"):
             own[name] = list(own[name])
+        own["feature_names"] = None if self.feature_names is None else list(self.feature_names)
         return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in own.items()}
 
     def __str__(self) -> str:
@@ -221,12 +226,17 @@ def diagnose(
     5
     """
     check_arguments(estimator, transitions, cv)
-    X = transitions.features(system).reshape(len(transitions), -1)
-    return judge(estimator, transitions, X, cv, n_jobs)[0]
+    X, names = named_features(transitions, system)
+    return judge(estimator, transitions, X.reshape(len(X), -1), names, cv, n_jobs)[0]
 
 
 def judge(
-    estimator: Any, transitions: Transitions, X: NDArray[Any], cv: int, n_jobs: int | None
+    estimator: Any,
+    transitions: Transitions,
+    X: NDArray[Any],
+    names: tuple[str, ...] | None,
+    cv: int,
+    n_jobs: int | None,
 ) -> tuple[Diagnosis, UnseenPredictions | None]:
     """Diagnose with features X, (n, n_features); also return the predictions, if there are any."""
     labels = Summary.of(transitions)
@@ -235,7 +245,7 @@ def judge(
     if labels.base_rate < 1 and (labels.n_plans > 1 or isinstance(estimator, FrozenEstimator)):
         n_folds = 0 if isinstance(estimator, FrozenEstimator) else min(int(cv), labels.n_plans)
         y, plan = transitions.y, transitions.plan
-        predictions = predict_unseen(estimator, X, y, plan, n_folds, n_jobs)
+        predictions = predict_unseen(estimator, X, y, plan, n_folds, n_jobs, names)
     is_network = isinstance(estimator, TransitionReliabilityClassifier)
     ranges = np.column_stack([X.min(axis=0), X.max(axis=0)]).astype(float)
     constant = constant_columns(X, ranges)
@@ -247,6 +257,7 @@ def judge(
         constant_features=constant,
         duplicate_features=duplicate_columns(X, constant),
         unscaled_features=unscaled_columns(X, ranges) if is_network else (),
+        feature_names=names,
     )
     return diagnosis, predictions
 

@@ -14,8 +14,7 @@ from sklearn.frozen import FrozenEstimator
 
 from reliability.diagnosis import Diagnosis, check_arguments, judge
 from reliability.labels import RELIABLE
-from reliability.scenes import SceneArgument
-from reliability.transitions import Transitions
+from reliability.transitions import Transitions, named_features
 
 SIGNIFICANCE = 0.05
 _COMPARED = ("balanced_accuracy", "reliable_recall", "onset_recall")
@@ -78,7 +77,7 @@ class FeatureComparison:
 def compare_features(
     estimator: Any,
     transitions: Transitions,
-    feature_sets: Mapping[str, SceneArgument | NDArray[Any]],
+    feature_sets: Mapping[str, Any],
     *,
     cv: int = 5,
     n_jobs: int | None = None,
@@ -92,11 +91,11 @@ def compare_features(
     estimator : classifier
         As for :func:`diagnose`; a clone of it is trained with each set.
     transitions : Transitions
-    feature_sets : dict of str to System, sequence of Systems, callable or ndarray
+    feature_sets : dict of str to System, sequence of Systems, callable, ndarray or DataFrame
         At least two, by name. A system, a sequence of systems or a callable ``random_state ->
-        System`` describes the transitions as in :meth:`Transitions.features`; an array of shape
-        (n, n_features) holds features of one's own making. The others are compared with the
-        first.
+        System`` describes the transitions as in :meth:`Transitions.features`; an array or a table
+        of shape (n, n_features) holds features of one's own making. The others are compared with
+        the first.
     cv : int, default=5
     n_jobs : int, default=None
         As for :func:`diagnose`.
@@ -140,7 +139,7 @@ def compare_features(
             f"transitions, got {feature_sets!r}."
         )
     rows = {name: _rows(name, one, transitions) for name, one in feature_sets.items()}
-    judged = {name: judge(estimator, transitions, X, cv, n_jobs) for name, X in rows.items()}
+    judged = {name: judge(estimator, transitions, *own, cv, n_jobs) for name, own in rows.items()}
     reliable = transitions.y == RELIABLE
     right = {
         name: None if predictions is None else predictions.reliable == reliable
@@ -155,16 +154,24 @@ def compare_features(
     )
 
 
-def _rows(name: str, described_by: Any, transitions: Transitions) -> NDArray[Any]:
+def _rows(
+    name: str, described_by: Any, transitions: Transitions
+) -> tuple[NDArray[Any], tuple[str, ...] | None]:
+    """Return features, (n, n_features), and their names, if they have any."""
     n = len(transitions)
+    names = None
+    if hasattr(described_by, "to_numpy"):
+        names = tuple(map(str, described_by.columns))
+        described_by = described_by.to_numpy()
     if not isinstance(described_by, np.ndarray):
-        return transitions.features(described_by).reshape(n, -1)
+        X, names = named_features(transitions, described_by)
+        return X.reshape(n, -1), names
     if described_by.ndim != 2 or len(described_by) != n:
         raise ValueError(
             f"feature_sets[{name!r}] must have a row for each of the {n} transitions, got an array "
             f"of shape {described_by.shape}."
         )
-    return described_by
+    return described_by, names
 
 
 def _p_values(

@@ -16,6 +16,7 @@ from sklearn.utils.validation import has_fit_parameter
 
 from reliability.answer_checks import one_per_row
 from reliability.item_files import Item
+from reliability.named_features import columns_to_ask, columns_to_fit
 
 _N_FOLDS = 5
 
@@ -29,11 +30,14 @@ class LabelledPlans:
     X : ndarray of shape (n, n_features)
     y : ndarray of int of shape (n,)
     plan : ndarray of int of shape (n,)
+    names : tuple of str or None
+        Of the features, None if the system does not say any.
     """
 
     X: NDArray[Any]
     y: NDArray[np.int64]
     plan: NDArray[np.int64]
+    names: tuple[str, ...] | None
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,8 @@ class FitTask:
         ValueError
             If the rows have one label only, or too few plans have both.
         """
-        X, y, plan = self.data.X, self.data.y, self.data.plan
+        y, plan = self.data.y, self.data.plan
+        X = columns_to_fit(self.estimator, self.data.names).of(self.data.X)
         folds = self._folds()
         estimator = with_seeds(clone(self.estimator), self.seed)
         parameters = fit_parameters(estimator, plan)
@@ -122,7 +127,8 @@ def correct(estimator: Any, data: LabelledPlans) -> NDArray[np.bool_]:
     if not len(data.y):
         return np.zeros(0, dtype=np.bool_)
     source = f"{type(estimator).__name__}.predict"
-    return one_per_row(estimator.predict(data.X), len(data.y), source) == data.y
+    X = columns_to_ask(estimator, data.names, data.X.shape[1]).of(data.X)
+    return one_per_row(estimator.predict(X), len(data.y), source) == data.y
 
 
 def balanced_accuracy(right: NDArray[np.bool_], y: NDArray[np.int64]) -> float:

@@ -18,7 +18,7 @@ from reliability.transitions import Transitions, join
 from systems.validation import RandomState, check_count
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LearningResult:
     """What rounds of learning gave.
 
@@ -49,6 +49,8 @@ class LearningResult:
     def __str__(self) -> str:
         """Return the reports of all rounds, and which estimator was kept."""
         return "\n".join([*map(str, self.rounds), self.conclusion])
+
+    __repr__ = __str__
 
     @property
     def conclusion(self) -> str:

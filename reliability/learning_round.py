@@ -29,7 +29,7 @@ from reliability.round_report import (
 from reliability.scenes import SceneArgument, SceneFamily
 from reliability.store import Job, ResumableStore, run_jobs
 from reliability.summary import Summary
-from reliability.transitions import Transitions
+from reliability.transitions import Transitions, named_features
 from systems.validation import RandomState, as_seed, check_count, check_number
 
 _KIND = "estimators fitted in rounds, one in each file"
@@ -175,7 +175,8 @@ class Recipe:
         )
         transitions = self._transitions(items, done, folder.verbose)
         rows = self._informative(transitions, done[0].transitions if done else transitions)
-        of_round = LabelledPlans(rows.features(self.system), rows.y, rows.plan)
+        X, names = named_features(rows, self.system)
+        of_round = LabelledPlans(X, rows.y, rows.plan, names)
         data = _stacked([*(one.rows for one in done), of_round])
         task = FitTask(self.estimator, data, for_fit, folder.n_jobs)
         fit = run_jobs([Job(name, task, folder.store)], n_jobs=1)[0]
@@ -302,4 +303,5 @@ def _stacked(parts: list[LabelledPlans]) -> LabelledPlans:
         np.concatenate([part.X for part in parts]),
         np.concatenate([part.y for part in parts]),
         np.concatenate([part.plan for part in parts]),
+        parts[0].names,
     )

@@ -95,6 +95,9 @@ class ResumableStore:
         self.files = ItemFiles(self.folder, digest_of(canonical_json(found)))
         self._remove_abandoned()
 
+    def __repr__(self) -> str:
+        return f"<ResumableStore of {len(self.names())} items in {str(self.folder)!r}>"
+
     @classmethod
     def at(cls, folder: str | os.PathLike[str]) -> ResumableStore:
         """Open a folder as its manifest describes it, to read what is there.

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from reliability.archive import read_arrays, write_arrays
 from reliability.labels import RELIABLE, UNRELIABLE
+from reliability.named_features import as_table
 from reliability.scenes import SceneArgument, SceneFamily
 from reliability.transition_columns import as_integers, checked_columns, ids_apart
 from reliability.trimmed_rows import ARRAYS, TrimmedRows, as_bits
+from systems.features.names import feature_names
 from systems.system import System
 from systems.validation import as_finite_array, check_count
 
@@ -206,7 +209,15 @@ class Transitions:
         joined.plan = np.concatenate(ids_apart([part.plan for part in parts]))
         return joined
 
-    def features(self, system: SceneArgument) -> NDArray[Any]:
+    @overload
+    def features(
+        self, system: SceneArgument, *, as_frame: Literal[False] = False
+    ) -> NDArray[Any]: ...
+
+    @overload
+    def features(self, system: SceneArgument, *, as_frame: Literal[True]) -> Any: ...
+
+    def features(self, system: SceneArgument, *, as_frame: bool = False) -> Any:
         """Describe the transitions to an estimator, each in its scene.
 
         Parameters
@@ -214,30 +225,31 @@ class Transitions:
         system : System, sequence of Systems, or callable ``random_state -> System``
             What the transitions were collected from, or the same scenes with other features. A
             single system describes all rows, which must then be of one scene.
+        as_frame : bool, default=False
+            Return a pandas DataFrame, whose columns are called as the system's
+            ``feature_names_out`` says.
 
         Returns
         -------
-        X : ndarray of shape (n, n_features)
+        X : ndarray or DataFrame of shape (n, n_features)
 
         Raises
         ------
         ValueError
-            If the transitions are of scenes that ``system`` does not have.
+            If the transitions are of scenes that ``system`` does not have, or a table is asked
+            for and the system does not say what its features are called.
+        ImportError
+            If a table is asked for and pandas is not installed.
         """
-        family = SceneFamily(system)
-        scenes = np.unique(self.scene) if len(self) else np.zeros(1, dtype=np.int64)
-        family.check_ids(scenes)
-        first = family.system(int(scenes[0]))
-        none = first.features(*np.empty((2, 0, first.reduced_dim)))
-        X = np.empty((len(self), *none.shape[1:]), dtype=none.dtype)
-        for scene in scenes:
-            described = family.system(int(scene))
-            rows = np.flatnonzero(self.scene == scene)
-            # A million grids fit into memory once, not twice: parts are filled in, not joined.
-            for begin in range(0, len(rows), _DESCRIBED_AT_ONCE):
-                chunk = rows[begin : begin + _DESCRIBED_AT_ONCE]
-                X[chunk] = self._described(described, chunk)
-        return X
+        X, names = named_features(self, system)
+        if not as_frame:
+            return X
+        if names is None:
+            raise ValueError(
+                "as_frame=True needs names of the features, and system does not say what they are "
+                f"called: give it feature_names_out, a sequence of {X.shape[1]} strings."
+            )
+        return as_table(X, names)
 
     def _described(self, system: System, rows: NDArray[np.int64]) -> NDArray[Any]:
         first = self._first[rows]
@@ -302,6 +314,32 @@ class Transitions:
             return cls.from_arrays(arrays)
         except ValueError as error:
             raise ValueError(f"{path} is not a whole file of transitions ({error})") from error
+
+
+def named_features(
+    transitions: Transitions, system: SceneArgument
+) -> tuple[NDArray[Any], tuple[str, ...] | None]:
+    """Return the features of transitions and what they are called, None if that is not said."""
+    family = SceneFamily(system)
+    scenes = np.unique(transitions.scene) if len(transitions) else np.zeros(1, dtype=np.int64)
+    family.check_ids(scenes)
+    first = family.system(int(scenes[0]))
+    none = first.features(*np.empty((2, 0, first.reduced_dim)))
+    n_features = math.prod(none.shape[1:])
+    names = feature_names(first, n_features)
+    X = np.empty((len(transitions), *none.shape[1:]), dtype=none.dtype)
+    for scene in scenes:
+        described = family.system(int(scene))
+        if feature_names(described, n_features) != names:
+            raise ValueError(
+                f"system calls the features of scenes {scenes[0]} and {scene} by different names."
+            )
+        rows = np.flatnonzero(transitions.scene == scene)
+        # A million grids fit into memory once, not twice: parts are filled in, not joined.
+        for begin in range(0, len(rows), _DESCRIBED_AT_ONCE):
+            chunk = rows[begin : begin + _DESCRIBED_AT_ONCE]
+            X[chunk] = transitions._described(described, chunk)
+    return X, names
 
 
 def join(parts: Sequence[Transitions]) -> Transitions:

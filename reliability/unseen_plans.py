@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from sklearn.utils.validation import has_fit_parameter
 from reliability.base_rate import BaseRateWarning
 from reliability.classifier import TransitionReliabilityClassifier
 from reliability.labels import RELIABLE
+from reliability.named_features import Columns, columns_to_ask, columns_to_fit
 
 
 class UnseenPredictions(NamedTuple):
@@ -41,6 +43,7 @@ def predict_unseen(
     plan: NDArray[np.int64],
     n_folds: int,
     n_jobs: int | None = None,
+    names: Sequence[str] | None = None,
 ) -> UnseenPredictions:
     """Train a clone without each fold's plans, and ask it about them.
 
@@ -58,16 +61,19 @@ def predict_unseen(
         At least 2.
     n_jobs : int, default=None
         Processes that train.
+    names : sequence of str, default=None
+        Of the features; estimators that know features by name get tables.
 
     Returns
     -------
     predictions : UnseenPredictions
     """
     if isinstance(estimator, FrozenEstimator):
-        return _answers(estimator, X)
+        return _answers(estimator, columns_to_ask(estimator, names, X.shape[1]).of(X))
+    columns = columns_to_fit(estimator, names)
     folds = list(GroupKFold(n_folds).split(X, y, plan))
     answers = Parallel(n_jobs=n_jobs)(
-        delayed(_train_and_ask)(estimator, X, y, plan, *fold) for fold in folds
+        delayed(_train_and_ask)(estimator, columns, X, y, plan, *fold) for fold in folds
     )
     joined = UnseenPredictions(np.empty(len(y), np.bool_), np.empty(len(y)))
     for (_, unseen), answer in zip(folds, answers, strict=True):
@@ -77,6 +83,7 @@ def predict_unseen(
 
 def _train_and_ask(
     estimator: Any,
+    columns: Columns,
     X: NDArray[Any],
     y: NDArray[np.int64],
     plan: NDArray[np.int64],
@@ -90,8 +97,8 @@ def _train_and_ask(
     trained = _without_checkpoints(clone(estimator))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", BaseRateWarning)
-        trained.fit(X[seen], y[seen], **_fit_parameters(trained, plan[seen]))
-    return _answers(trained, X[unseen])
+        trained.fit(columns.of(X[seen]), y[seen], **_fit_parameters(trained, plan[seen]))
+    return _answers(trained, columns.of(X[unseen]))
 
 
 def _without_checkpoints(estimator: Any) -> Any:
@@ -110,7 +117,7 @@ def _fit_parameters(estimator: Any, plan: NDArray[np.int64]) -> dict[str, Any]:
     return {"groups": plan} if takes_groups or has_fit_parameter(estimator, "groups") else {}
 
 
-def _answers(trained: Any, X: NDArray[Any]) -> UnseenPredictions:
+def _answers(trained: Any, X: Any) -> UnseenPredictions:
     reliable = np.asarray(trained.predict(X)) == RELIABLE
     if not hasattr(trained, "predict_proba"):
         return UnseenPredictions(reliable, np.full(len(X), np.nan))

@@ -44,6 +44,9 @@ class GoalRegion(ABC):
     True
     """
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}, a region of goals>"
+
     @abstractmethod
     def sample(self, rng: np.random.Generator, n: int) -> Array:
         """Draw configurations of the region, all that is random from ``rng``.

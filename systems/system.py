@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.features.default import default_features
+from systems.features.names import DefaultFeatureNames
 from systems.goal_region import GoalRegion
+from systems.reprs import shortened
 from systems.validation import RandomState
 
 Array = NDArray[np.float64]
@@ -43,6 +45,9 @@ class Problem:
 
     start: Any
     goal: Array | GoalRegion
+
+    def __repr__(self) -> str:
+        return f"Problem(start={shortened(self.start)}, goal={shortened(self.goal)})"
 
 
 @dataclass(frozen=True)
@@ -121,6 +126,10 @@ class System(ABC):
     independent_parts : tuple of slice, default=()
         Parts of the configuration that can move while the others stand still, such as each of the
         rope's two grippers. Planners then also shorten the path of one part at a time.
+    feature_names_out : sequence of str of length n_features, or None
+        What the columns of :meth:`features` are called, all of them different, for tables and
+        messages. None, the default of a system with features of its own, if nothing is said. An
+        estimator that was fitted on some of these columns, or in another order, is given those.
 
     References
     ----------
@@ -133,6 +142,10 @@ class System(ABC):
     bounds: Array
     angular: tuple[int, ...] = ()
     independent_parts: tuple[slice, ...] = ()
+    feature_names_out: Sequence[str] | None = DefaultFeatureNames()  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: reduced_dim {getattr(self, 'reduced_dim', 'unknown')}>"
 
     @abstractmethod
     def reduce(self, state: Any) -> Array:

@@ -31,6 +31,9 @@ class SuspendedLoad(System):
     reduced_dim = configuration_dim = 3
     step_size = 0.6
     bounds = np.array([[0.3, 0.3, 0.3], [7.7, 5.7, 3.5]])
+    feature_names_out = ["height", "motion_x", "motion_y", "motion_z", "motion_horizontal"] + [
+        f"space_{side}" for side in ("here", "east", "west", "north", "south", "below")
+    ]
 
     def __getstate__(self):
         return {}  # Pickles leave MuJoCo's model out: each process makes its own.

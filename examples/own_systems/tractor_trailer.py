@@ -37,6 +37,9 @@ class TractorTrailer(System):
     reduced_dim, configuration_dim = 3, 2
     step_size = 0.4
     bounds = np.array([[0.35, 0.35], [ROOM - 0.35, ROOM - 0.35]])
+    feature_names_out = ["ahead", "left", "sin_of_turn", "cos_of_turn"] + [
+        f"space_{a:+}_ahead_{b:+}_left" for a, b in SENSED
+    ]
 
     def __getstate__(self):
         return {}  # Pickles leave MuJoCo's model out: each process makes its own.

@@ -16,7 +16,7 @@ from systems.car.dynamics import (
     execute_rows,
     trace_commands,
 )
-from systems.car.features import transition_features
+from systems.car.features import FEATURE_NAMES, transition_features
 from systems.car.geometry import (
     CAR_RADIUS,
     WHEELBASE,
@@ -92,6 +92,7 @@ class Car(System):
     configuration_dim = 3
     angular = (2,)
     step_size = STEP_SIZE
+    feature_names_out = FEATURE_NAMES
 
     def __init__(self, scene: str | CarScene = "open_lot") -> None:
         if isinstance(scene, str):

@@ -28,6 +28,16 @@ MOVE_AHEAD, MOVE_LEFT, TURN, SLIP, CURVATURE, END_CLEARANCE = range(6)
 ARC_CLEARANCES = END_CLEARANCE + 1
 SENSED = ARC_CLEARANCES + len(ALONG_ARC)
 N_FEATURES = SENSED + len(AHEAD) * len(ASIDE)
+FEATURE_NAMES = (
+    "ahead",
+    "left",
+    "turn",
+    "sine_of_slip",
+    "curvature",
+    "clearance_at_end",
+    *(f"clearance_at_{part:.0%}_of_arc" for part in ALONG_ARC),
+    *(f"distance_{ahead:+}_ahead_{left:+}_left" for ahead in AHEAD for left in ASIDE),
+)
 
 
 @compiled

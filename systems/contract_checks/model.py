@@ -18,6 +18,8 @@ from systems.contract_checks.calls import (
     check_zero_rows,
     fail,
 )
+from systems.errors import SystemContractError
+from systems.features.names import feature_names
 from systems.system import Array, System
 
 Mask = NDArray[np.bool_]
@@ -118,7 +120,7 @@ def check_close(system: System, reduced: Array, next_reduced: Array) -> None:
 
 
 def check_features(system: System, reduced: Array, next_reduced: Array) -> None:
-    """Check ``features``, of many transitions and of none."""
+    """Check ``features``, of many transitions and of none, and what they are called."""
     rows = call_twice(system, "features", reduced, next_reduced)
     if not isinstance(rows, np.ndarray) or rows.ndim != 2 or len(rows) != len(reduced):
         fail(system, "features", f"must return a row per transition, got {np.shape(rows)}.")
@@ -127,3 +129,7 @@ def check_features(system: System, reduced: Array, next_reduced: Array) -> None:
     check_rowwise(system, "features", reduced, next_reduced)
     none = call_with_zero_rows(system, "features", reduced, next_reduced)
     check_zero_rows(system, "features", none, (0, rows.shape[1]))
+    try:
+        feature_names(system, rows.shape[1])
+    except ValueError as error:
+        raise SystemContractError(str(error)) from error

@@ -37,3 +37,18 @@ def default_features(
     moved = shortest_way(reduced, next_reduced, angular) / step_size
     around = directions(start[:, list(angular)])
     return np.hstack([placed, around, reduced[:, dim:], moved])
+
+
+def default_feature_names(
+    reduced_dim: int, configuration_dim: int, angular: tuple[int, ...]
+) -> tuple[str, ...]:
+    """Return the names of the columns of :func:`default_features`.
+
+    q0, q1, … are the entries of the configuration, and the further entries of the reduced state
+    keep their places: b3 is the first after a configuration of three.
+    """
+    entries = [f"q{i}" for i in range(configuration_dim)]
+    rest = [f"b{i}" for i in range(configuration_dim, reduced_dim)]
+    placed = np.delete(entries, angular).tolist()
+    around = [f"{function}_q{i}" for function in ("sin", "cos") for i in angular]
+    return (*placed, *around, *rest, *(f"change_of_{name}" for name in [*entries, *rest]))

@@ -60,6 +60,9 @@ class MujocoObstacles:
         self.ignore = tuple(ignore)
         self.height = height
 
+    def __repr__(self) -> str:
+        return f"MujocoObstacles({self.model_file!r}, ignore={self.ignore}, height={self.height})"
+
     def __call__(self, points: ArrayLike) -> Array:
         """Return the signed distance of each point from the nearest obstacle.
 

@@ -10,6 +10,10 @@ from systems.compilation import compiled
 Array = NDArray[np.float64]
 # Rounding of a motion that was shortened to one step.
 STEP_ALLOWANCE = 1 + 1e-9
+# What :func:`transition_features` returns. A link's angle is from the x axis.
+FEATURE_NAMES = tuple(
+    f"{kind}{i}" for kind in ("q", "sin_of_link", "cos_of_link", "change_of_q") for i in range(3)
+)
 
 
 @compiled

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from systems.planar_arm.kernels import limited_targets, transition_features
+from systems.planar_arm.kernels import FEATURE_NAMES, limited_targets, transition_features
 from systems.planar_arm.kinematics import REACH, forward_kinematics, inverse_kinematics
 from systems.system import Array, Problem, Rollout, StopReason, System
 from systems.validation import RandomState, as_finite_array, as_generator, check_rows
@@ -48,6 +48,7 @@ class PlanarArm(System):
     configuration_dim = 3
     bounds = np.array([[-np.pi] * 3, [np.pi] * 3])
     step_size = 0.01 * float(np.linalg.norm(bounds[1] - bounds[0]))
+    feature_names_out = FEATURE_NAMES
 
     def reduce(self, state: Any) -> Array:
         """Return the joint angles of a true state: r, the identity."""

@@ -70,6 +70,9 @@ class SceneRenderer:
         self._camera.distance = float(np.linalg.norm(high - low))
         self._camera.azimuth, self._camera.elevation = azimuth, elevation
 
+    def __repr__(self) -> str:
+        return f"<SceneRenderer of {self._scene.name!r}>"
+
     def __enter__(self) -> SceneRenderer:
         return self
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.rope.band.band import bands_close, reduce_rope, reduced_dim
 from systems.rope.band.propagation_kernels import propagate_bands
-from systems.rope.features.registry import FEATURES
+from systems.rope.features.registry import FEATURE_NAMES, FEATURES
 from systems.rope.gripper_kernels import allowed_moves, steer_grippers
 from systems.rope.paper_scenes import load_scene
 from systems.rope.sampling import draw_grippers, draw_hanging_rope
@@ -106,6 +106,11 @@ class Rope(System):
     def __repr__(self) -> str:
         scene, kind = self.scene.name, self.feature_kind
         return f"Rope({scene!r}, engine={self.engine!r}, features={kind!r})"
+
+    @property
+    def feature_names_out(self) -> tuple[str, ...] | None:  # type: ignore[override]
+        """What the columns of :meth:`features` are called; None for "voxels"."""
+        return FEATURE_NAMES[self.feature_kind]
 
     def reduce(self, state: RopeState) -> Array:
         """Pull the rope taut: r. PBD ropes begin where the rope is, at rest.

@@ -50,6 +50,26 @@ N_FEATURES = MOTION_B.stop
 SEPARATION, BAND_LENGTH, RISE, DEPTH_OF_ROPE = range(_N_LENGTHS)
 ALONG, LEFT, UP = range(3)
 
+
+def _names() -> tuple[str, ...]:
+    lengths = ("gripper_separation", "band_length", "rise", "depth_of_rope")
+    cells = [f"column{i}_row{j}" for i in range(N_COLUMNS) for j in range(N_ROWS)]
+    ways = ("along", "left", "up")
+    offsets = [f"offset{i}_{way}" for i in range(N_COLUMNS) for way in ways]
+    return (
+        *(f"{name}_{when}" for when in ("before", "after") for name in lengths),
+        *(f"distance_{cell}" for cell in cells),
+        *(
+            f"pbd{rope}_{name}"
+            for rope in range(len(KINDS))
+            for name in (*(f"distance_{cell}" for cell in cells), *offsets, "length")
+        ),
+        *(f"motion_{gripper}_{way}" for gripper in ("a", "b") for way in ways),
+    )
+
+
+FEATURE_NAMES = _names()
+
 # A triple as seen after a turn by half a circle about the vertical.
 _TURNED = (-1.0, -1.0, 1.0)
 

@@ -9,6 +9,18 @@ from systems.rope.features.components import component_features
 from systems.rope.obstacles.shapes import Array
 from systems.rope.scene import Scene
 
+FEATURE_NAMES = (
+    "gripper_separation_before",
+    "gripper_separation_after",
+    "band_length_before",
+    "band_length_after",
+    *(
+        f"{parts}_{when}"
+        for parts in ("parts", "free_parts", "occupied_parts")
+        for when in ("before", "after", "change")
+    ),
+)
+
 
 def vector_features(reduced: Array, next_reduced: Array, scene: Scene) -> Array:
     """Describe transitions of bands in thirteen numbers.

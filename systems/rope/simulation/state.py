@@ -37,6 +37,10 @@ class RopeState:
     nodes: Array
     simulation: Array | None = None
 
+    def __repr__(self) -> str:
+        first, last = np.round(self.grippers, 3).tolist()
+        return f"<RopeState: {len(self.nodes)} nodes, grippers at {first} and {last}>"
+
 
 def checked_rope(state: RopeState, scene: Scene) -> RopeState:
     """Return a state with float64 arrays, after checking that it can be of a scene's rope.
