@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from reliability.exploration import is_exploring
 from systems.system import Array
-from systems.validation import check_number
+from systems.validation import check_choice, check_number
 
 ACCEPTANCES = ("fixed", "probability", "temperature")
 # T-RRT's nFailMax and α.
@@ -152,8 +152,7 @@ def make_acceptance(
     ValueError
         If a parameter is out of range, or the rule needs what is not known of the estimator.
     """
-    if acceptance not in ACCEPTANCES:
-        raise ValueError(f"acceptance must be one of {', '.join(ACCEPTANCES)}, got {acceptance!r}.")
+    check_choice(acceptance, "acceptance", ACCEPTANCES)
     check_number(k, "k", 0, np.inf)
     if accuracy is not None:
         check_number(accuracy, "accuracy", 0, 1)

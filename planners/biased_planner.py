@@ -15,7 +15,7 @@ from sklearn.base import BaseEstimator
 from sklearn.utils.validation import check_is_fitted
 from threadpoolctl import threadpool_limits
 
-from planners.acceptance import resolve_accuracy, warn_if_permissive
+from planners.acceptance import ACCEPTANCES, resolve_accuracy, warn_if_permissive
 from planners.budget import Budget, never
 from planners.check_transition import CheckTransition
 from planners.edge_checker import EdgeChecker
@@ -30,7 +30,16 @@ from planners.shortcutting_repropagated import RepropagatedShortcuts
 from planners.success_calibration import SuccessCalibration
 from systems.goal_region import GoalRegion
 from systems.system import Array, System
-from systems.validation import RandomState, as_seed, check_count, check_number, is_integer
+from systems.validation import (
+    RandomState,
+    as_seed,
+    check_choice,
+    check_count,
+    check_flag,
+    check_number,
+    is_integer,
+    is_number,
+)
 
 # No restart has this number, so that none has these random numbers.
 _FOR_ROBUSTNESS = (2**32 - 1,)
@@ -241,10 +250,11 @@ class BiasedPlanner(BaseEstimator):
     def _check_parameters(self) -> None:
         if not isinstance(self.system, System):
             raise ValueError(f"system must be a System, got {self.system!r}.")
+        check_choice(self.acceptance, "acceptance", ACCEPTANCES)
+        check_flag(self.simplify, "simplify")
         check_count(self.max_iterations, "max_iterations")
         limit = self.time_limit
-        is_number = isinstance(limit, int | float | np.number) and not isinstance(limit, bool)
-        if limit is not None and not (is_number and limit > 0):
+        if limit is not None and not (is_number(limit) and limit > 0):
             raise ValueError(f"time_limit must be None or positive seconds, got {limit!r}.")
         if not is_integer(self.restarts) or self.restarts < 0:
             raise ValueError(f"restarts must be 0 or a positive integer, got {self.restarts!r}.")

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from systems.angles import wrap_angle
 from systems.compilation import compiled
+from systems.validation import as_numbers, is_number
 
 Array = NDArray[np.float64]
 
@@ -29,10 +30,25 @@ def split_edges(
         In order along each edge; an edge of no length is one transition.
     edge : ndarray of int of shape (n_transitions,)
         The edge that each transition belongs to.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ, a number is not finite, or ``step_size`` is not positive.
     """
+    begins, stops = as_numbers(starts, "starts"), as_numbers(ends, "ends")
+    if begins.ndim != 2 or begins.shape != stops.shape:
+        raise ValueError(
+            f"starts and ends must have one shape, (n_edges, d), got {begins.shape} and "
+            f"{stops.shape}."
+        )
+    if not (np.isfinite(begins).all() and np.isfinite(stops).all()):
+        raise ValueError("starts and ends must be finite, got NaN or infinity.")
+    if not is_number(step_size) or not 0 < step_size < np.inf:
+        raise ValueError(f"step_size must be a positive number, got {step_size!r}.")
     if not angular:
-        return _split_straight(starts, ends, step_size)
-    return _split_turning(starts, ends, step_size, angular)
+        return _split_straight(begins, stops, float(step_size))
+    return _split_turning(begins, stops, float(step_size), angular)
 
 
 @compiled

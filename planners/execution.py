@@ -17,8 +17,9 @@ from planners.planning_problem import can_start
 from planners.remaining_plan import still_arrives
 from reliability.scenes import SceneFamily
 from systems.errors import SimulationDivergedError
+from systems.goal_region import GoalRegion
 from systems.system import Array, Problem, System
-from systems.validation import as_seed, check_number, is_integer
+from systems.validation import as_array, as_seed, check_number, is_integer
 
 
 class ExecutionStatus(Enum):
@@ -167,7 +168,10 @@ def execute(
     """
     check_number(tolerance, "tolerance", 0, np.inf)
     check_max_replans(max_replans)
+    if not isinstance(system, System):
+        raise ValueError(f"system must be a System, got {system!r}.")
     SceneFamily(system).check_planner(planner)
+    _check_problem(problem, system)
     run = _Run(system, planner, problem, float(tolerance))
     try:
         status = run.to_the_end(int(max_replans))
@@ -180,6 +184,13 @@ def check_max_replans(value: Any) -> None:
     """Raise ``ValueError`` unless a value is a number of replans."""
     if not is_integer(value) or value < 0:
         raise ValueError(f"max_replans must be an integer of at least 0, got {value!r}.")
+
+
+def _check_problem(problem: Any, system: System) -> None:
+    if not isinstance(problem, Problem):
+        raise ValueError(f"problem must be a Problem, got {problem!r}.")
+    if not isinstance(problem.goal, GoalRegion):
+        as_array(problem.goal, "problem.goal", (None, system.configuration_dim))
 
 
 @dataclass(eq=False)

@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reliability.archive import read_arrays, write_arrays
+from systems.validation import as_finite_array, as_numbers, is_integer
 
 FORMAT_VERSION = 2
 Array = NDArray[np.float64]
 # Left out of a file where they are None.
 _MAY_BE_NONE = frozenset({"reliability", "calibrated_probability", "robustness"})
+_ARRAYS = frozenset({"reduced", "commands", "tree", "reliability"})
 
 
 class PlanStatus(Enum):
@@ -127,7 +129,15 @@ class PlanResult:
         return 1.0 if self.reliability is None else float(self.reliability.prod())
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write one npz file."""
+        """Write one npz file.
+
+        Raises
+        ------
+        ValueError
+            If this is not a whole plan: arrays of numbers that go together, and a seed.
+        """
+        if not is_integer(self.random_state):
+            raise ValueError(f"random_state must be an integer, got {self.random_state!r}.")
         values: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
         values["status"] = self.status.name
         # As text, since a seed may be larger than any of numpy's integers.
@@ -135,6 +145,7 @@ class PlanResult:
         for name in _MAY_BE_NONE:
             if values[name] is None:
                 del values[name]
+        _check_arrays({name: as_numbers(values[name], name) for name in _ARRAYS & values.keys()})
         write_arrays(path, values, format_version=FORMAT_VERSION)
 
     @classmethod
@@ -148,9 +159,12 @@ class PlanResult:
         """
         names = {field.name for field in fields(cls)} - _MAY_BE_NONE
         arrays = read_arrays(path, names, format_version=FORMAT_VERSION, kind="a plan")
-        _check_arrays(path, arrays)
+        try:
+            _check_arrays(arrays)
+        except ValueError as error:
+            raise ValueError(f"{path} is not a whole file of a plan ({error})") from error
         values: dict[str, Any] = dict.fromkeys(_MAY_BE_NONE) | arrays
-        for name in arrays.keys() - {"reduced", "commands", "tree", "reliability"}:
+        for name in arrays.keys() - _ARRAYS:
             values[name] = arrays[name].item()
         values["status"] = PlanStatus[values["status"]]
         values["random_state"] = int(values["random_state"])
@@ -164,16 +178,15 @@ class PlanResult:
         )
 
 
-def _check_arrays(path: str | os.PathLike[str], arrays: dict[str, NDArray[Any]]) -> None:
+def _check_arrays(arrays: dict[str, NDArray[Any]]) -> None:
     """Raise ``ValueError`` unless arrays are those of one plan."""
-    n = len(arrays["commands"])
-    expected = {"reduced": (n + 1, 2), "commands": (n, 2), "tree": (len(arrays["tree"]), 3)}
-    if "reliability" in arrays:
-        expected["reliability"] = (n, 1)
-    for name, (length, ndim) in expected.items():
-        array = arrays[name]
-        if array.ndim != ndim or len(array) != length or not np.isfinite(array).all():
-            raise ValueError(
-                f"{path} is not a whole file of a plan ({name}, of the shape {array.shape}, holds "
-                f"NaN or doesn't go with {n} commands)."
-            )
+    n = arrays["commands"].shape[0] if arrays["commands"].ndim else 0
+    expected = {
+        "commands": (None, None),
+        "reduced": (n + 1, None),
+        "tree": (None, 2, None),
+        "reliability": (n,),
+    }
+    for name, shape in expected.items():
+        if name in arrays:
+            as_finite_array(arrays[name], name, shape)

@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from systems.validation import is_integer
+
 
 class Share(NamedTuple):
     """How many of several, with the interval that holds the true share with confidence 0.95.
@@ -24,12 +26,22 @@ class Share(NamedTuple):
 
     @classmethod
     def of(cls, n: int, total: int) -> Share:
-        """Compute the interval; it is 0 to 1 if there are none."""
+        """Compute the interval; it is 0 to 1 if there are none.
+
+        Raises
+        ------
+        ValueError
+            If these are no integers, or ``n`` is not from 0 to ``total``.
+        """
         from scipy.stats import binomtest
 
+        if not is_integer(total) or total < 0:
+            raise ValueError(f"total must be an integer of at least 0, got {total!r}.")
+        if not is_integer(n) or not 0 <= n <= total:
+            raise ValueError(f"n must be an integer from 0 to total, {total}, got {n!r}.")
         if total == 0:
             return cls(0, 0, 0.0, 1.0)
-        interval = binomtest(n, total).proportion_ci(method="wilson")
+        interval = binomtest(int(n), int(total)).proportion_ci(method="wilson")
         return cls(n, total, float(interval.low), float(interval.high))
 
     def __str__(self) -> str:

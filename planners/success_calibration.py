@@ -17,7 +17,7 @@ from sklearn.utils.validation import check_is_fitted
 from planners.check_transition import negative_log_likelihood
 from planners.result import PlanResult
 from systems.system import Array
-from systems.validation import check_number
+from systems.validation import as_numbers, check_number
 
 # Thresholds that min_success_for may return lie between this many equal parts of the plans.
 N_PARTS = 20
@@ -263,7 +263,7 @@ def _robustness(results: Sequence[PlanResult]) -> Array:
 
 def _checked_outcomes(results: Sequence[PlanResult], succeeded: ArrayLike) -> NDArray[np.bool_]:
     _check_results(results)
-    y = np.asarray(succeeded)
+    y = as_numbers(succeeded, "succeeded")
     if len(results) == 0:
         raise ValueError("results must hold at least one plan, got none.")
     if y.shape != (len(results),) or not np.isin(y, [0, 1]).all():
@@ -281,7 +281,7 @@ def _checked_outcomes(results: Sequence[PlanResult], succeeded: ArrayLike) -> ND
 
 
 def _check_results(results: Sequence[PlanResult]) -> None:
-    if isinstance(results, PlanResult) or not all(isinstance(r, PlanResult) for r in results):
+    if not isinstance(results, Sequence) or not all(isinstance(r, PlanResult) for r in results):
         raise ValueError(f"results must be a sequence of PlanResult, got {results!r}.")
     for number, result in enumerate(results):
         if result.solved and result.reliability is None:

@@ -15,6 +15,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from reliability.item_files import put
+from systems.validation import as_path
 
 _VERSION = "format_version"
 _DIGEST = "digest"
@@ -38,7 +39,7 @@ def write_arrays(
     named[_DIGEST] = np.array(_digest_of_arrays(named))
     content = io.BytesIO()
     np.savez(content, **named)  # type: ignore[arg-type]
-    put(Path(path), content.getbuffer())
+    put(as_path(path), content.getbuffer())
 
 
 def read_arrays(
@@ -63,8 +64,9 @@ def read_arrays(
     FileNotFoundError
         If there is no such file.
     """
+    file = as_path(path)
     try:
-        arrays = _read_all(Path(path))
+        arrays = _read_all(file)
         found = int(arrays[_VERSION])
     except FileNotFoundError:
         raise

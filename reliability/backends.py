@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator
 
-from reliability.networks.hyperparameters import Hyperparameters, as_plain, check_flag
+from reliability.networks.hyperparameters import Hyperparameters, as_plain
 from reliability.networks.mlp_inference import MLPInference
 from reliability.networks.voxel_format import check_pooling, grid_shape
-from systems.validation import check_count
+from systems.validation import check_count, check_flag
 
 if TYPE_CHECKING:
     from reliability.networks.batches import LabelledRows

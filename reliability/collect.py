@@ -24,7 +24,7 @@ from reliability.scenes import SceneArgument, SceneFamily
 from reliability.store import Job, ResumableStore, run_jobs
 from reliability.summary import Summary
 from reliability.transitions import Transitions, join
-from systems.validation import RandomState, as_seed, check_count
+from systems.validation import RandomState, as_seed, check_choice, check_count
 
 _KIND = "transitions of executed plans, one plan in each file"
 ON_ERROR = ("raise", "skip")
@@ -151,12 +151,6 @@ def execute_plans(
         for i in range(int(n_plans))
     ]
     return _run(tasks, store, n_jobs, verbose)
-
-
-def check_choice(value: Any, name: str, choices: tuple[str, ...]) -> None:
-    """Raise ``ValueError`` unless a value is one of some choices."""
-    if value not in choices:
-        raise ValueError(f"{name} must be one of {', '.join(choices)}, got {value!r}.")
 
 
 def _open_store(

@@ -89,6 +89,7 @@ class ItemFiles:
 
     def write(self, name: str, item: Item) -> None:
         """Write an item, whole or not at all."""
+        as_json(item.facts, "facts")
         names = sorted(item.arrays)
         header = {
             "store": self.store,
@@ -125,6 +126,17 @@ def put(target: Path, content: bytes | memoryview, *, replace: bool = True) -> N
 def canonical_json(value: Any) -> bytes:
     """Return JSON that is the same for equal values."""
     return json.dumps(value, sort_keys=True, separators=(",", ":")).encode()
+
+
+def as_json(value: Any, name: str) -> dict[str, Any]:
+    """Return a dict as a JSON file gives it back, or raise ``ValueError`` if it can't hold it."""
+    if not isinstance(value, dict):
+        raise ValueError(f"{name} must be a dict, got {value!r}.")
+    try:
+        read_back: dict[str, Any] = json.loads(canonical_json(value))
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must be what JSON can hold, got {value!r} ({error}).") from error
+    return read_back
 
 
 def digest_of(content: bytes) -> str:

@@ -50,6 +50,7 @@ def label_transitions(
             f"executed must have between 1 and {len(plan)} states, as many as predicted at most, "
             f"got {len(rollout)}."
         )
+    _check_callable(close, "close")
     agrees = np.zeros(len(plan), dtype=np.bool_)
     agrees[: len(rollout)] = _one_bool_per_row(close(plan[: len(rollout)], rollout), rollout)
     return np.where(agrees[:-1] & agrees[1:], RELIABLE, UNRELIABLE)
@@ -123,6 +124,8 @@ def label_executed_transitions(
             f"executed must have between 1 and {len(given) + 1} states, one more than commands at "
             f"most, got {len(states)}."
         )
+    _check_callable(propagate, "propagate")
+    _check_callable(close, "close")
     following, valid = propagate(states[:-1], given[:n_given])
     step = np.flatnonzero(_one_bool_per_row(valid, states[:-1], "propagate"))
     next_reduced = as_finite_array(
@@ -131,6 +134,11 @@ def label_executed_transitions(
     agrees = _one_bool_per_row(close(next_reduced, states[step + 1]), step)
     y = np.where(agrees, RELIABLE, UNRELIABLE)
     return ExecutedTransitions(states[step], next_reduced, y, step)
+
+
+def _check_callable(function: Any, name: str) -> None:
+    if not callable(function):
+        raise ValueError(f"{name} must be callable, as a system's is, got {function!r}.")
 
 
 def _one_bool_per_row(answers: Any, rows: NDArray[Any], name: str = "close") -> NDArray[np.bool_]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reliability.advice import mostly_diverged
-from reliability.collect import ON_ERROR, check_choice, execute_plans, joined
+from reliability.collect import ON_ERROR, execute_plans, joined
 from reliability.fitting import FitTask, LabelledPlans, balanced_accuracy, correct, unpickled
 from reliability.identity import describe, describe_planner
 from reliability.item_files import Item
@@ -30,7 +30,7 @@ from reliability.scenes import SceneArgument, SceneFamily
 from reliability.store import Job, ResumableStore, run_jobs
 from reliability.summary import Summary
 from reliability.transitions import Transitions, named_features
-from systems.validation import RandomState, as_seed, check_count, check_number
+from systems.validation import RandomState, as_seed, check_choice, check_count, check_number
 
 _KIND = "estimators fitted in rounds, one in each file"
 

@@ -34,6 +34,8 @@ def check_model(model: Any) -> None:
     ValueError
         If a part is damaged.
     """
+    if not isinstance(model, BaseEstimator):
+        raise ValueError(f"estimator must be one of scikit-learn's kind, got {model!r}.")
     for part, n_features in _parts(model, None, set()):
         if isinstance(part, BaseDecisionTree):
             check_tree_nodes(part.tree_, n_features, type(part).__name__)

@@ -11,6 +11,7 @@ import sklearn
 
 from reliability.model_checks import check_model
 from reliability.model_files import ModelFileError, read_model, write_model
+from systems.validation import as_path
 
 SKOPS = ".skops"
 
@@ -44,7 +45,7 @@ def save_estimator(estimator: Any, path: str | os.PathLike[str]) -> None:
     ...     load_estimator(f"{folder}/model.skops").predict([[2.0]])
     array([1])
     """
-    path = Path(path)
+    path = as_path(path)
     if path.suffix != SKOPS:
         raise ValueError(f"path must end in {SKOPS}, got {os.fspath(path)!r}.")
     check_model(estimator)
@@ -74,7 +75,7 @@ def load_estimator(path: str | os.PathLike[str]) -> Any:
     FileNotFoundError
         If there is no such file.
     """
-    path = Path(path)
+    path = as_path(path)
     estimator = _load_skops(path) if path.suffix == SKOPS else _load_joblib(path)
     if not hasattr(estimator, "predict"):
         raise ModelFileError(

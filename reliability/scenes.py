@@ -114,7 +114,9 @@ class SceneFamily:
         return {"system": described[0] if self.is_single else described, "code": code}
 
     def check_planner(self, planner: Any) -> None:
-        """Raise ``ValueError`` if a planner has a system that is not one of the family."""
+        """Raise ``ValueError`` if a planner can't plan, or has a system of another family."""
+        if isinstance(planner, type) or not callable(getattr(planner, "plan", None)):
+            raise ValueError(f"planner must have the method plan, got {planner!r}.")
         own = getattr(planner, "system", None)
         if own is not None and not self.has(own):
             raise ValueError(

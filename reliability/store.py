@@ -20,11 +20,13 @@ from reliability.item_files import (
     Item,
     ItemFiles,
     StoreError,
+    as_json,
     canonical_json,
     digest_of,
     put,
 )
 from reliability.orphans import end_with_parent
+from systems.validation import as_path
 
 FORMAT_VERSION = 2
 _MANIFEST = "manifest.json"
@@ -77,11 +79,13 @@ class ResumableStore:
         adopt: tuple[str, ...] = (),
     ) -> None:
         # Workers may have been started in another working directory.
-        self.folder = Path(folder).absolute()
+        self.folder = as_path(folder).absolute()
         if self.folder.exists() and not self.folder.is_dir():
             raise StoreError(f"{self.folder} must be a folder, and is a file.")
+        if not isinstance(kind, str):
+            raise ValueError(f"kind must be a string, got {kind!r}.")
+        wanted: dict[str, Any] = {"kind": kind, "description": as_json(description, "description")}
         self.folder.mkdir(parents=True, exist_ok=True)
-        wanted = {"kind": kind, "description": json.loads(json.dumps(description))}
         found = self._claim(wanted)
         for name in adopt:
             wanted["description"][name] = found["description"].get(name)
@@ -197,6 +201,8 @@ def run_jobs(
     StoreError
         If a file can't be used. All files are looked at before any work begins.
     """
+    if not isinstance(jobs, Sequence) or not all(isinstance(job, Job) for job in jobs):
+        raise ValueError(f"jobs must be a sequence of Job, got {jobs!r}.")
     items = [job.finished() for job in jobs]
     missing = [i for i, item in enumerate(items) if item is None]
     tasks = (

@@ -57,6 +57,8 @@ class Summary:
         transitions : Transitions
             At least one.
         """
+        if not isinstance(transitions, Transitions) or not len(transitions):
+            raise ValueError(f"transitions must be Transitions, at least one, got {transitions!r}.")
         unreliable = transitions.y == UNRELIABLE
         plans, number, sizes = np.unique(transitions.plan, return_inverse=True, return_counts=True)
         first = np.full(len(plans), np.iinfo(np.int64).max)

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.model_selection import GroupShuffleSplit, ShuffleSplit
 from sklearn.utils import compute_class_weight
 from sklearn.utils.multiclass import type_of_target
-from sklearn.utils.validation import check_consistent_length
+
+from systems.validation import as_numbers
 
 
 def encode_labels(y: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.intp]]:
@@ -38,7 +39,7 @@ def check_sample_weight(sample_weight: ArrayLike | None, n_rows: int) -> NDArray
     """
     if sample_weight is None:
         return np.ones(n_rows)
-    weight = np.array(sample_weight, dtype=np.float64)
+    weight = as_numbers(sample_weight, "sample_weight")
     if weight.shape != (n_rows,) or not (np.isfinite(weight) & (weight >= 0)).all():
         raise ValueError(
             f"sample_weight must hold {n_rows} finite weights that are not negative, "
@@ -76,14 +77,24 @@ def hold_out(
     seed = int(rng.integers(2**31))
     n_units = n_rows
     if groups is not None:
-        check_consistent_length(np.zeros(n_rows), groups)
-        n_units = len(np.unique(np.asarray(groups)))
+        n_units = len(np.unique(_checked_groups(groups, n_rows)))
     n_held_out = min(round(fraction * n_units), n_units - 1)
     if n_held_out < 1:
         return np.arange(n_rows), np.arange(0)
     splitter = ShuffleSplit if groups is None else GroupShuffleSplit
     split = splitter(1, test_size=n_held_out, random_state=seed)
     return next(split.split(np.zeros(n_rows), groups=groups))
+
+
+def _checked_groups(groups: ArrayLike, n_rows: int) -> NDArray[Any]:
+    ids = np.asarray(groups)
+    # Whatever else can't be put in order can't be told apart by np.unique.
+    if ids.shape != (n_rows,) or (ids.dtype.hasobject and len({type(one) for one in ids}) > 1):
+        raise ValueError(
+            f"groups must hold {n_rows} plan ids of one type, got {ids.dtype} of the shape "
+            f"{ids.shape}."
+        )
+    return ids
 
 
 def thin(rows: NDArray[np.intp], n: int | None) -> NDArray[np.intp]:

@@ -344,8 +344,9 @@ def named_features(
 
 def join(parts: Sequence[Transitions]) -> Transitions:
     """Join transitions end to end, with their ids as they are."""
-    if not parts:
-        raise ValueError("parts must hold at least one Transitions, got none.")
+    are_parts = isinstance(parts, Sequence) and all(isinstance(p, Transitions) for p in parts)
+    if not are_parts or not parts:
+        raise ValueError(f"parts must be a sequence of at least one Transitions, got {parts!r}.")
     states = TrimmedRows.concatenate([part._states for part in parts])
     n_before = np.cumsum([0, *(len(part._states) for part in parts)])
     first = [part._first + n for part, n in zip(parts, n_before[:-1], strict=True)]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from systems.compilation import compiled
+from systems.validation import as_numbers, is_integer
 
 Array = NDArray[np.float64]
 TURN = 2 * np.pi
@@ -35,11 +38,23 @@ def wrap_columns(rows: Array, angular: tuple[int, ...]) -> Array:
     wrapped : ndarray of shape (..., d)
         A copy, or ``rows`` itself if there are no angles.
     """
-    if not angular:
+    if isinstance(angular, tuple) and not angular:
         return rows
-    wrapped = np.array(rows, order="C")
-    _wrap_in_place(wrapped.reshape(-1, rows.shape[-1]), angular)
+    wrapped = np.array(as_numbers(rows, "rows"), order="C")
+    _check_angular(angular, wrapped.shape)
+    if wrapped.size:
+        _wrap_in_place(wrapped.reshape(-1, wrapped.shape[-1]), angular)
     return wrapped
+
+
+def _check_angular(angular: Any, shape: tuple[int, ...]) -> None:
+    """Raise ``ValueError`` unless compiled code finds all columns, which it doesn't check."""
+    d = shape[-1] if shape else 0
+    if not isinstance(angular, tuple) or not all(is_integer(i) and -d <= i < d for i in angular):
+        raise ValueError(
+            "angular must be a tuple of indices along the last axis of rows, of the shape "
+            f"{shape}, got {angular!r}."
+        )
 
 
 @compiled
@@ -63,4 +78,12 @@ def shortest_way(starts: Array, ends: Array, angular: tuple[int, ...]) -> Array:
     way : ndarray of shape (..., d)
         Angles in [-π, π).
     """
-    return wrap_columns(ends - starts, angular)
+    begins, stops = as_numbers(starts, "starts"), as_numbers(ends, "ends")
+    try:
+        way = stops - begins
+    except ValueError:
+        raise ValueError(
+            "starts and ends must have shapes that go together, got "
+            f"{begins.shape} and {stops.shape}."
+        ) from None
+    return wrap_columns(way, angular)

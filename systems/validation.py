@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterable
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -61,8 +64,14 @@ def is_integer(value: Any) -> TypeGuard[int]:
 
 
 def is_number(value: Any) -> TypeGuard[float]:
-    """Say whether a value is a real number of Python or numpy; True and False are not."""
-    return isinstance(value, Real) and not isinstance(value, bool)
+    """Say whether a value is a real number that a float can hold; True and False are not."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    try:
+        float(value)
+    except OverflowError:
+        return False
+    return True
 
 
 def check_count(value: Any, name: str) -> None:
@@ -71,27 +80,85 @@ def check_count(value: Any, name: str) -> None:
         raise ValueError(f"{name} must be a positive integer, got {value!r}.")
 
 
+def check_finite(value: Any, name: str) -> None:
+    """Raise ``ValueError`` unless a value is a finite number."""
+    if not is_number(value) or not -np.inf < value < np.inf:
+        raise ValueError(f"{name} must be a finite number, got {value!r}.")
+
+
 def check_number(value: Any, name: str, low: float, high: float) -> None:
     """Raise ``ValueError`` unless a value is a number from ``low`` to ``high``, both included."""
     if not is_number(value) or not low <= value <= high:
         raise ValueError(f"{name} must be a number between {low} and {high}, got {value!r}.")
 
 
-def check_rows(rows: str, n_columns: int, *arrays: Any) -> None:
-    """Raise ``ValueError`` unless every array has shape (n, n_columns).
+def as_path(value: Any) -> Path:
+    """Return a file's or folder's path, or raise ``ValueError`` if a value can't be one."""
+    if not isinstance(value, str | os.PathLike) or not os.fspath(value):
+        raise ValueError(f"path must be a string or path-like, and not empty, got {value!r}.")
+    return Path(value)
+
+
+def check_choice(value: Any, name: str, choices: Iterable[str]) -> None:
+    """Raise ``ValueError`` unless a value is one of some words."""
+    # Whether an array or a list is among them raises errors of its own.
+    if not isinstance(value, str) or value not in choices:
+        raise ValueError(f"{name} must be one of {', '.join(choices)}, got {value!r}.")
+
+
+def check_flag(value: Any, name: str) -> None:
+    """Raise ``ValueError`` unless a value is True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} must be True or False, got {value!r}.")
+
+
+def as_rows(kind: str, n_columns: int, **arrays: Any) -> list[NDArray[np.float64]]:
+    """Return arrays as float64, after checking that each has shape (n, n_columns).
 
     Parameters
     ----------
-    rows : str
+    kind : str
         What a row is, for the message, such as "poses [x, y, θ]".
     n_columns : int
-    *arrays : ndarray
+    **arrays : array-like
+        By the names of the arguments.
+
+    Returns
+    -------
+    rows : list of ndarray of float64
+        Those that are so already are returned as they are.
+
+    Raises
+    ------
+    ValueError
+        If the shape differs, or if a value is not a real number.
     """
-    for array in arrays:
-        if getattr(array, "ndim", 0) != 2 or array.shape[1] != n_columns:
-            raise ValueError(
-                f"Expected {rows} as an array of shape (n, {n_columns}), got {_described(array)}."
-            )
+    return [_as_rows(array, name, n_columns, kind) for name, array in arrays.items()]
+
+
+def as_row_pair(
+    kind: str, n_columns: int, **arrays: Any
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what :func:`as_rows` does, for two arrays that must have as many rows."""
+    first, second = as_rows(kind, n_columns, **arrays)
+    if len(first) != len(second):
+        one, other = arrays
+        raise ValueError(
+            f"{other} must have as many rows as {one}, {len(first)}, got {len(second)}."
+        )
+    return first, second
+
+
+def _as_rows(array: Any, name: str, n_columns: int, kind: str) -> NDArray[np.float64]:
+    # Planners ask thousands of times a second, with arrays that are right.
+    if not isinstance(array, np.ndarray) or array.dtype != np.float64:
+        array = as_numbers(array, name)
+    if array.ndim != 2 or array.shape[1] != n_columns:
+        raise ValueError(
+            f"{name} must be {kind}, of shape (n, {n_columns}), got the shape {array.shape}."
+        )
+    rows: NDArray[np.float64] = array
+    return rows
 
 
 def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
@@ -115,7 +182,7 @@ def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...]) -> NDA
     ValueError
         If the shape differs, or if a value is not a real number.
     """
-    array = _as_floats(values, name)
+    array = as_numbers(values, name)
     fits = array.ndim == len(shape) and all(
         want is None or want == got for want, got in zip(shape, array.shape, strict=True)
     )
@@ -174,20 +241,17 @@ def check_within_bounds(
         )
 
 
-def _as_floats(values: ArrayLike, name: str) -> NDArray[np.float64]:
+def as_numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    """Return an array of any shape as float64, or raise ``ValueError`` if it is none of numbers."""
     try:
         array = np.asarray(values)
         if array.dtype.kind in REAL_KINDS:
             return np.asarray(array, dtype=np.float64)
         complaint = None
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         complaint = error
     raise ValueError(f"{name} must be an array of numbers, got {values!r}.") from complaint
 
 
 def _shortened(array: NDArray[Any]) -> str:
     return np.array2string(array, threshold=8, edgeitems=2, separator=", ")
-
-
-def _described(value: Any) -> str:
-    return f"the shape {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
+from fuzzing import OUTCOMES
 from toy_systems import Disc
 
 from planners import BiasedRRTConnect
 from reliability import TransitionReliabilityClassifier, collect_transitions
 from systems import PlanarArm
+
+
+def pytest_terminal_summary(terminalreporter):
+    if "FUZZ_EXAMPLES" not in os.environ:
+        return
+    for door, outcomes in OUTCOMES.items():
+        told = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.most_common())
+        terminalreporter.write_line(f"{door}: {outcomes.total()} cases, {told}")
+    total = sum(outcomes.total() for outcomes in OUTCOMES.values())
+    terminalreporter.write_line(f"{total} cases in all")
 
 
 @pytest.fixture(scope="session")

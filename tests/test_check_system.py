@@ -214,7 +214,7 @@ def test_angles_that_the_model_leaves_unwrapped_are_named():
 @pytest.mark.parametrize(
     ("system", "message"),
     [
-        (object(), "must be a subclass of System"),
+        (object(), "must be a System"),
         (Unpicklable(), "does not pickle .* Leave simulators"),
         (Wandering(), "sample_configurations must draw from nothing but the given"),
         (Narrow(), r"sample_configurations must return an array of shape \(16, 2\)"),

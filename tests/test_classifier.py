@@ -207,7 +207,7 @@ def test_bad_parameters_are_refused_at_fit(parameters, message):
         (np.arange(10) % 2, {"sample_weight": -np.ones(10)}, "sample_weight must hold 10 finite"),
         (np.arange(10) % 2, {"sample_weight": np.ones(3)}, "sample_weight must hold 10 finite"),
         (np.arange(10) % 2, {"sample_weight": np.zeros(10)}, "must be positive for some"),
-        (np.arange(10) % 2, {"groups": np.arange(3)}, "inconsistent numbers of samples"),
+        (np.arange(10) % 2, {"groups": np.arange(3)}, "groups must hold 10 plan ids"),
     ],
 )
 def test_bad_data_are_refused_at_fit(y, arguments, message):

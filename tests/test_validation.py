@@ -8,10 +8,11 @@ import pytest
 from systems.validation import (
     as_finite_array,
     as_generator,
+    as_row_pair,
+    as_rows,
     as_seed,
     check_count,
     check_number,
-    check_rows,
     check_within_bounds,
 )
 
@@ -127,17 +128,24 @@ def test_messages_on_large_arrays_are_short():
     assert len(str(caught.value)) < 200
 
 
-def test_rows_are_checked_in_every_array():
-    good = np.zeros((2, 3))
-    check_rows("poses [x, y, θ]", 3, good, np.zeros((0, 3)))
-    for bad, got in (
-        (np.zeros(3), r"the shape \(3,\)"),
-        (np.zeros((3, 2)), r"the shape \(3, 2\)"),
-        ([[0, 0, 0]], "list"),
-    ):
-        expected = r"Expected poses \[x, y, θ\] as an array of shape \(n, 3\), got "
-        with pytest.raises(ValueError, match=expected + got):
-            check_rows("poses [x, y, θ]", 3, good, bad)
+def test_rows_that_are_right_are_returned_as_they_are():
+    good, none = np.zeros((2, 3)), np.zeros((0, 3))
+    first, second = as_rows("poses", 3, first=good, second=none)
+    assert first is good
+    assert second is none
+    (converted,) = as_rows("poses", 3, rows=[[1, 2, 3]])
+    np.testing.assert_array_equal(converted, [[1.0, 2.0, 3.0]])
+
+
+@pytest.mark.parametrize("bad", [np.zeros(3), np.zeros((3, 2)), [[0, 0]], 1.0])
+def test_rows_of_other_shapes_are_refused(bad):
+    with pytest.raises(ValueError, match=r"second must be poses, of shape \(n, 3\), got the shape"):
+        as_rows("poses", 3, first=np.zeros((2, 3)), second=bad)
+
+
+def test_pairs_of_rows_have_the_same_length():
+    with pytest.raises(ValueError, match="b must have as many rows as a, 2, got 1"):
+        as_row_pair("poses", 3, a=np.zeros((2, 3)), b=np.zeros((1, 3)))
 
 
 def test_bounds_are_included_and_the_first_row_outside_is_named():

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from systems.validation import check_count, check_number
+from systems.validation import check_count, check_flag, check_number
 
 _COUNTS = ("max_epochs", "batch_size", "epochs_per_decay", "rows_per_epoch")
 
@@ -51,12 +51,6 @@ def as_plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return tuple(as_plain(item) for item in value)
     return value.item() if isinstance(value, np.generic) else value
-
-
-def check_flag(value: Any, name: str) -> None:
-    """Raise ``ValueError`` unless a value is True or False."""
-    if not isinstance(value, bool | np.bool_):
-        raise ValueError(f"{name} must be True or False, got {value!r}.")
 
 
 def _check(given: dict[str, Any]) -> None:

@@ -26,7 +26,15 @@ from systems.car.geometry import (
 )
 from systems.car.scenes import SCENES, CarScene, pack_scene
 from systems.system import Array, Problem, Rollout, StopReason, System
-from systems.validation import RandomState, as_finite_array, as_generator, check_rows
+from systems.validation import (
+    RandomState,
+    as_finite_array,
+    as_generator,
+    as_row_pair,
+    as_rows,
+    check_choice,
+    check_number,
+)
 
 STEP_SIZE = 1.0
 CLOSE_DISTANCE = 0.15
@@ -96,8 +104,7 @@ class Car(System):
 
     def __init__(self, scene: str | CarScene = "open_lot") -> None:
         if isinstance(scene, str):
-            if scene not in SCENES:
-                raise ValueError(f"scene must be one of {', '.join(SCENES)}, got {scene!r}.")
+            check_choice(scene, "scene", SCENES)
             scene = SCENES[scene]
         if not isinstance(scene, CarScene):
             raise ValueError(f"scene must be a scene's name or a CarScene, got {scene!r}.")
@@ -115,12 +122,12 @@ class Car(System):
 
     def propagate(self, reduced: Array, command: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Predict b + u, valid if the car touches nothing on the way: g."""
-        check_rows(ROWS, 3, reduced, command)
+        reduced, command = as_row_pair(ROWS, 3, reduced=reduced, command=command)
         return straight_moves(reduced, command, self._packed)
 
     def steer(self, reduced: Array, configuration: Array) -> Array:
         """Return the displacement towards a pose, at most one step long."""
-        check_rows(ROWS, 3, reduced, configuration)
+        reduced, configuration = as_row_pair(ROWS, 3, reduced=reduced, configuration=configuration)
         return limited_ways(reduced, configuration, self.step_size)
 
     def rollout(self, state: Any, commands: ArrayLike) -> Rollout:
@@ -143,7 +150,7 @@ class Car(System):
             If the state or a command has the wrong shape or is not finite, or if the car touches
             something at the start.
         """
-        start = self._checked_states(as_finite_array(state, "state", (5,))[None])[0]
+        start = self._checked_states(as_finite_array(state, "state", (5,))[None], "state")[0]
         moves = as_finite_array(commands, "commands", (None, 3))
         states = np.empty((len(moves) + 1, 5))
         n_completed = execute_commands(start, moves, self._packed, states)
@@ -170,7 +177,7 @@ class Car(System):
         ValueError
             As :meth:`rollout`.
         """
-        starts = self._checked_states(as_finite_array(states, "states", (None, 5)))
+        starts = self._checked_states(as_finite_array(states, "states", (None, 5)), "states")
         moves = as_finite_array(commands, "commands", (len(starts), 3))
         return execute_rows(starts, moves, self._packed)
 
@@ -186,7 +193,7 @@ class Car(System):
         -------
         states : ndarray of shape (n, 5)
         """
-        start = self._checked_states(as_finite_array(state, "state", (5,))[None])[0]
+        start = self._checked_states(as_finite_array(state, "state", (5,))[None], "state")[0]
         moves = as_finite_array(commands, "commands", (None, 3))
         states = np.empty((1 + len(moves) * (1 + round(LONGEST_COMMAND / TIME_STEP)), 5))
         return states[: trace_commands(start, moves, self._packed, states)]
@@ -215,6 +222,7 @@ class Car(System):
 
     def close(self, predicted: Array, executed: Array) -> NDArray[np.bool_]:
         """Say for each row whether two poses are less than α = 0.15 (m, rad) apart: Close."""
+        predicted, executed = as_row_pair(ROWS, 3, predicted=predicted, executed=executed)
         return self.distance(predicted, executed) < CLOSE_DISTANCE
 
     def distance(self, one: Array, other: Array) -> Array:
@@ -228,7 +236,7 @@ class Car(System):
         -------
         distance : ndarray of shape (n,)
         """
-        check_rows(ROWS, 3, one, other)
+        one, other = as_row_pair(ROWS, 3, one=one, other=other)
         return np.linalg.norm(shortest_way(one, other, self.angular), axis=1)
 
     def clearance(self, poses: Array) -> Array:
@@ -243,7 +251,7 @@ class Car(System):
         clearance : ndarray of shape (n,)
             In metres.
         """
-        check_rows(ROWS, 3, poses)
+        (poses,) = as_rows(ROWS, 3, poses=poses)
         return clearances(poses, self._packed)
 
     def features(self, reduced: Array, next_reduced: Array) -> Array:
@@ -252,7 +260,7 @@ class Car(System):
         They do not depend on where in the scene the car is, so that an estimator serves any scene.
         See :func:`systems.car.features.transition_features` for the columns.
         """
-        check_rows(ROWS, 3, reduced, next_reduced)
+        reduced, next_reduced = as_row_pair(ROWS, 3, reduced=reduced, next_reduced=next_reduced)
         return transition_features(reduced, next_reduced, self._packed)
 
     def sample_problem(self, random_state: RandomState = None) -> Problem:
@@ -266,14 +274,16 @@ class Car(System):
 
     def goal_reached(self, reduced: Array, goal: Array) -> NDArray[np.bool_]:
         """Say for each row whether a pose is Close to one of the goal's: Goal_B."""
-        check_rows(ROWS, 3, reduced, goal)
+        reduced, goal = as_rows(ROWS, 3, reduced=reduced, goal=goal)
         gaps = shortest_way(reduced[:, None], goal[None], self.angular)
         return (np.linalg.norm(gaps, axis=2) < GOAL_DISTANCE).any(axis=1)
 
     def succeeded(self, state: Any, goal: ArrayLike, tolerance: float) -> bool:
         """Say whether the car is less than ``tolerance`` (m, rad) from one of the goal's poses."""
+        check_number(tolerance, "tolerance", 0, np.inf)
         poses = as_finite_array(goal, "goal", (None, 3))
-        return bool((self.distance(self.reduce(state)[None], poses) < tolerance).any())
+        here = np.tile(self.reduce(state), (len(poses), 1))
+        return bool((self.distance(here, poses) < tolerance).any())
 
     def _draw_free_pose(self, rng: np.random.Generator) -> Array:
         while True:
@@ -282,8 +292,10 @@ class Car(System):
             if self.clearance(pose[None])[0] > ROOM_AT_ENDS:
                 return pose
 
-    def _checked_states(self, states: Array) -> Array:
+    def _checked_states(self, states: Array, name: str) -> Array:
         inside = clearances(states[:, :3], self._packed) <= 0
         if inside.any():
-            raise ValueError(f"The car must not touch anything, and does at {states[inside][0]}.")
+            raise ValueError(
+                f"{name} must not touch anything, and the car does at {states[inside][0]}."
+            )
         return states

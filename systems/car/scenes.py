@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from systems.car.geometry import PackedScene
-from systems.validation import RandomState, as_finite_array, as_generator, is_number
+from systems.validation import RandomState, as_finite_array, as_generator, check_finite, is_number
 
 LOT_SIZE = 8.0
 MIN_OBSTACLES, MAX_OBSTACLES = 5, 10
@@ -32,7 +33,8 @@ class Circle:
     radius: float
 
     def __post_init__(self) -> None:
-        as_finite_array([self.x, self.y], "centre", (2,))
+        check_finite(self.x, "x")
+        check_finite(self.y, "y")
         if not is_number(self.radius) or not 0 < self.radius < np.inf:
             raise ValueError(f"radius must be a positive number, got {self.radius!r}.")
 
@@ -93,6 +95,10 @@ class CarScene:
         low_x, low_y, high_x, high_y = as_finite_array(self.bounds, "bounds", (4,))
         if not (low_x < high_x and low_y < high_y):
             raise ValueError(f"bounds must be (x_min, y_min, x_max, y_max), got {self.bounds!r}.")
+        if not isinstance(self.obstacles, Sequence):
+            raise ValueError(
+                f"obstacles must be a sequence of Circle or ConvexPolygon, got {self.obstacles!r}."
+            )
         for obstacle in self.obstacles:
             if not isinstance(obstacle, Circle | ConvexPolygon):
                 raise ValueError(f"obstacles must be Circle or ConvexPolygon, got {obstacle!r}.")

@@ -13,7 +13,7 @@ from systems.validation import is_integer, is_number
 def check_attributes(system: System) -> None:
     """Check the attributes that :class:`systems.System` documents."""
     if not isinstance(system, System):
-        raise SystemContractError(f"A system must be a subclass of System, got {system!r}.")
+        raise SystemContractError(f"system must be a System (subclass it), got {system!r}.")
     _check_dimensions(system)
     step = getattr(system, "step_size", None)
     if not is_number(step) or not 0 < step < np.inf:

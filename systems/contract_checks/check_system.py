@@ -30,6 +30,7 @@ from systems.contract_checks.variation import (
     wander,
 )
 from systems.system import Array, System
+from systems.validation import is_integer
 
 N_PROBLEMS = 4
 N_ROWS = 16
@@ -53,6 +54,8 @@ def check_system(system: System, *, random_state: int = 0) -> None:
         For the first fault that is found; the message names the method, what it returned and what
         is expected.
     """
+    if not is_integer(random_state) or random_state < 0:
+        raise ValueError(f"random_state must be an integer of at least 0, got {random_state!r}.")
     check_attributes(system)
     check_pickles(system)
     check_samples(system, random_state, N_ROWS)

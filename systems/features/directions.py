@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from systems.validation import as_numbers
+
 
 def directions(angles: ArrayLike) -> NDArray[np.float64]:
     """Return the sines, then the cosines, of angles.
@@ -29,5 +31,7 @@ def directions(angles: ArrayLike) -> NDArray[np.float64]:
     >>> directions([[np.pi, np.pi / 2]]).round(3) + 0.0
     array([[ 0.,  1., -1.,  0.]])
     """
-    radians = np.asarray(angles, dtype=np.float64)
+    radians = as_numbers(angles, "angles")
+    if not radians.ndim:
+        raise ValueError(f"angles must be an array, got the number {angles!r}.")
     return np.concatenate([np.sin(radians), np.cos(radians)], axis=-1)

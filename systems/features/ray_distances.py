@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from systems.features.mujoco_obstacles import MujocoObstacles
-from systems.validation import is_number
+from systems.validation import as_numbers, is_number
 
 Array = NDArray[np.float64]
 # A ray has arrived where an obstacle is nearer than this share of its reach.
@@ -61,9 +61,11 @@ def ray_distances(
     """
     if not is_number(reach) or not 0 < reach < np.inf:
         raise ValueError(f"reach must be a positive number, got {reach!r}.")
-    starts, ways = np.broadcast_arrays(
-        np.asarray(origins, dtype=np.float64), np.asarray(rays, dtype=np.float64)
-    )
+    if not callable(obstacles) and not isinstance(obstacles, MujocoObstacles):
+        raise ValueError(f"obstacles must be callable or a MujocoObstacles, got {obstacles!r}.")
+    starts, ways = _together(as_numbers(origins, "origins"), as_numbers(rays, "rays"))
+    if not np.isfinite(starts).all():
+        raise ValueError("origins must be finite, got NaN or infinity.")
     length = np.linalg.norm(ways, axis=-1, keepdims=True)
     if not (length > 0).all() or not np.isfinite(length).all():
         raise ValueError("rays must be directions, of finite length and not zero.")
@@ -71,6 +73,20 @@ def ray_distances(
         return obstacles.cast(starts, ways / length, reach)
     flat = starts.reshape(-1, starts.shape[-1]), (ways / length).reshape(-1, starts.shape[-1])
     return _traced(obstacles, *flat, reach).reshape(starts.shape[:-1])
+
+
+def _together(origins: Array, rays: Array) -> tuple[Array, Array]:
+    """Return both with the shape that they broadcast to."""
+    try:
+        starts, ways = np.broadcast_arrays(origins, rays)
+    except ValueError:
+        starts = ways = np.empty(())
+    if not starts.ndim:
+        raise ValueError(
+            "origins and rays must have shapes (..., d) that go together, got "
+            f"{origins.shape} and {rays.shape}."
+        )
+    return starts, ways
 
 
 def _traced(obstacles: Callable[[Any], Any], starts: Array, ways: Array, reach: float) -> Array:

@@ -10,7 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from systems.planar_arm.kernels import FEATURE_NAMES, limited_targets, transition_features
 from systems.planar_arm.kinematics import REACH, forward_kinematics, inverse_kinematics
 from systems.system import Array, Problem, Rollout, StopReason, System
-from systems.validation import RandomState, as_finite_array, as_generator, check_rows
+from systems.validation import (
+    RandomState,
+    as_finite_array,
+    as_generator,
+    as_row_pair,
+    as_rows,
+    check_number,
+)
 
 if TYPE_CHECKING:
     from systems.planar_arm.simulation import ArmSimulation
@@ -56,12 +63,12 @@ class PlanarArm(System):
 
     def propagate(self, reduced: Array, command: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Predict that the arm gets to the commanded configuration: g."""
-        check_rows(ROWS, 3, reduced, command)
+        reduced, command = as_row_pair(ROWS, 3, reduced=reduced, command=command)
         return command.copy(), np.ones(len(command), dtype=np.bool_)
 
     def steer(self, reduced: Array, configuration: Array) -> Array:
         """Return the configuration to command: the given one, or one step towards it."""
-        check_rows(ROWS, 3, reduced, configuration)
+        reduced, configuration = as_row_pair(ROWS, 3, reduced=reduced, configuration=configuration)
         return limited_targets(reduced, configuration, self.step_size)
 
     def rollout(self, state: Any, commands: ArrayLike) -> Rollout:
@@ -97,12 +104,12 @@ class PlanarArm(System):
 
     def close(self, predicted: Array, executed: Array) -> NDArray[np.bool_]:
         """Say for each row whether two configurations are less than α = 0.075 rad apart: Close."""
-        check_rows(ROWS, 3, predicted, executed)
+        predicted, executed = as_row_pair(ROWS, 3, predicted=predicted, executed=executed)
         return np.linalg.norm(predicted - executed, axis=1) < CLOSE_DISTANCE
 
     def features(self, reduced: Array, next_reduced: Array) -> Array:
         """Return joint angles, directions of the links, and the motion in steps, (n, 12)."""
-        check_rows(ROWS, 3, reduced, next_reduced)
+        reduced, next_reduced = as_row_pair(ROWS, 3, reduced=reduced, next_reduced=next_reduced)
         return transition_features(reduced, next_reduced, self.step_size)
 
     def sample_problem(self, random_state: RandomState = None) -> Problem:
@@ -198,12 +205,12 @@ class PlanarArm(System):
         positions : ndarray of shape (n, 4, 2)
             x and z, in metres, with the base at the origin.
         """
-        check_rows(ROWS, 3, configurations)
+        (configurations,) = as_rows(ROWS, 3, configurations=configurations)
         return forward_kinematics(configurations)
 
     def goal_reached(self, reduced: Array, goal: Array) -> NDArray[np.bool_]:
         """Say for each row whether a configuration is one of the goal's: Goal_B."""
-        check_rows(ROWS, 3, reduced, goal)
+        reduced, goal = as_rows(ROWS, 3, reduced=reduced, goal=goal)
         distances = np.linalg.norm(reduced[:, None] - goal[None], axis=2)
         return (distances < GOAL_DISTANCE).any(axis=1)
 
@@ -212,6 +219,7 @@ class PlanarArm(System):
 
         The joints do not wrap: a configuration that differs by a whole turn is not the same.
         """
+        check_number(tolerance, "tolerance", 0, np.inf)
         executed = as_finite_array(state, "state", (3,))
         solutions = as_finite_array(goal, "goal", (None, 3))
         return bool((np.linalg.norm(solutions - executed, axis=1) < tolerance).any())

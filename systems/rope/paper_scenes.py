@@ -8,6 +8,7 @@ import numpy as np
 
 from systems.rope.obstacles.shapes import Box, Capsule, Cylinder, Obstacle, Range, box_from_ranges
 from systems.rope.scene import NODE_SPACING, Scene
+from systems.validation import check_choice
 
 # Links of the rope's capsule chain in the paper's four lengths.
 _SHORT, _REGULAR, _LONG, _VERY_LONG = 25, 39, 50, 70
@@ -31,8 +32,7 @@ def load_scene(name: str) -> Scene:
     McConachie et al. 2020, "Scenarios"; positions and sizes from the authors' public
     configuration files.
     """
-    if name not in _SCENES:
-        raise ValueError(f"scene must be one of {', '.join(SCENE_NAMES)}, got {name!r}.")
+    check_choice(name, "name", SCENE_NAMES)
     return _SCENES[name]()
 
 

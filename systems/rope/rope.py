@@ -13,7 +13,7 @@ from systems.rope.band.band import bands_close, reduce_rope, reduced_dim
 from systems.rope.band.propagation_kernels import propagate_bands
 from systems.rope.features.registry import FEATURE_NAMES, FEATURES
 from systems.rope.gripper_kernels import allowed_moves, steer_grippers
-from systems.rope.paper_scenes import load_scene
+from systems.rope.paper_scenes import SCENE_NAMES, load_scene
 from systems.rope.sampling import draw_grippers, draw_hanging_rope
 from systems.rope.scene import STEP_SIZE, Scene
 from systems.rope.simulation.engines import ENGINES
@@ -27,7 +27,13 @@ from systems.rope.slack.pbd_ropes import (
     varied_pbd_model,
 )
 from systems.system import Array, Problem, Rollout, System
-from systems.validation import RandomState, as_finite_array, as_generator
+from systems.validation import (
+    RandomState,
+    as_finite_array,
+    as_generator,
+    check_choice,
+    check_number,
+)
 
 GOAL_DISTANCE = 0.025
 
@@ -85,13 +91,12 @@ class Rope(System):
         features: str = "voxels",
     ) -> None:
         if isinstance(scene, str):
+            check_choice(scene, "scene", SCENE_NAMES)
             scene = load_scene(scene)
         if not isinstance(scene, Scene):
             raise ValueError(f"scene must be a Scene or the name of one, got {scene!r}.")
-        if engine not in ENGINES:
-            raise ValueError(f"engine must be one of {', '.join(ENGINES)}, got {engine!r}.")
-        if features not in FEATURES:
-            raise ValueError(f"features must be one of {', '.join(FEATURES)}, got {features!r}.")
+        check_choice(engine, "engine", ENGINES)
+        check_choice(features, "features", FEATURES)
         self.scene = scene
         self.engine = engine
         self.feature_kind = features
@@ -242,12 +247,14 @@ class Rope(System):
 
     def goal_reached(self, reduced: Array, goal: Array) -> NDArray[np.bool_]:
         """Say, row by row, whether the grippers are within 0.025 m, in R^6, of a goal: Goal_B."""
-        way = reduced[:, None, :6] - goal[None]
+        rows, goals = _as_rows(reduced, "reduced", self.reduced_dim), _as_rows(goal, "goal", 6)
+        way = rows[:, None, :6] - goals[None]
         return (np.linalg.norm(way, axis=2) <= GOAL_DISTANCE).any(axis=1)
 
     def succeeded(self, state: RopeState, goal: ArrayLike, tolerance: float) -> bool:
         """Say whether the grippers are within ``tolerance``, metres in R^6, of a goal: Goal_X."""
         _check_state(state)
+        check_number(tolerance, "tolerance", 0, np.inf)
         goals = as_finite_array(goal, "goal", (None, 6))
         grippers = as_finite_array(state.grippers, "state.grippers", (2, 3)).ravel()
         return bool((np.linalg.norm(goals - grippers, axis=1) <= tolerance).any())

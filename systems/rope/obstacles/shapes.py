@@ -162,7 +162,9 @@ def _as_point(values: Point, name: str) -> Point:
 
 
 def _check_positive(value: float, name: str) -> None:
-    if not is_number(value) or not SMALLEST_SIZE <= value <= LARGEST_SIZE:
+    # Comparing with a float16 makes the limits float16 too, of which the larger is too large.
+    plain = value.item() if isinstance(value, np.generic) else value
+    if not is_number(plain) or not SMALLEST_SIZE <= plain <= LARGEST_SIZE:
         raise ValueError(
             f"{name} must be positive and finite, from {SMALLEST_SIZE:g} to {LARGEST_SIZE:g} m, "
             f"got {value!r}."
