@@ -60,6 +60,8 @@ class Experiment:
         What is learned from follows from it, what is calibrated on from the next one, and the
         problems from the one after that.
     n_jobs : int
+    labels : str
+        Which labels the new road learns from.
     """
 
     system: System
@@ -68,6 +70,7 @@ class Experiment:
     n_problems: int
     first_seed: int
     n_jobs: int
+    labels: str
 
     def planner(self, estimator: Any = None, **parameters: Any) -> Any:
         """Return the planner for a system of this kind."""
@@ -99,6 +102,7 @@ class Experiment:
             n_rounds=N_ROUNDS,
             n_plans=for_rounds // N_ROUNDS,
             n_validation=round(SHARE_OF_VALIDATION * self.n_plans) // N_ROUNDS,
+            labels=self.labels,
             n_jobs=self.n_jobs,
             random_state=self.first_seed,
             path=self.folder / "rounds",
@@ -159,6 +163,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--plans", type=int, default=1200, help="executed plans to learn from")
     parser.add_argument("--problems", type=int, default=200, help="to count successes in")
     parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("--labels", choices=("executed", "plan", "both"), default="executed")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, default=Path("build/own_systems"))
     options = parser.parse_args(arguments)
@@ -172,6 +177,7 @@ def main(arguments: list[str] | None = None) -> None:
             options.problems,
             options.first_seed,
             options.jobs,
+            options.labels,
         )
         evaluations = experiment.run()
         print(Evaluation.compare(evaluations))

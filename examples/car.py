@@ -19,7 +19,7 @@ car = Car("narrow_gate")
 classifier = FastHistGradientBoostingClassifier(max_iter=60, class_weight="balanced")
 planner = BiasedRRTConnect(car, k=np.inf, accuracy=0.9, transitions_per_edge=1)
 learned = learn_in_rounds(
-    classifier, planner, car, n_rounds=3, n_plans=N_PLANS, n_jobs=2, random_state=0
+    classifier, planner, car, n_rounds=3, n_plans=N_PLANS, labels="plan", n_jobs=2, random_state=0
 )
 print(learned)
 

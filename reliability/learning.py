@@ -80,7 +80,7 @@ def learn_in_rounds(
     n_rounds: int,
     n_plans: int | Sequence[int],
     n_validation: int = 100,
-    labels: str = "plan",
+    labels: str = "executed",
     exploring_k: float = 6.0,
     n_after: int | None = None,
     on_error: str = "raise",
@@ -123,9 +123,11 @@ def learn_in_rounds(
     n_validation : int, default=100
         Problems that each round's estimator plans at its end. With 100, two estimators that
         succeed equally often in the long run differ by up to 10 or so by chance.
-    labels : {"plan", "executed", "both"}, default="plan"
-        As in :func:`collect_transitions`. "plan" gives the labels of the paper. "executed" labels
-        each command by what g predicts from where the true system was.
+    labels : {"executed", "plan", "both"}, default="executed"
+        As in :func:`collect_transitions`. "executed" labels each command by what g predicts from
+        where the true system was, so that a plan that goes wrong early gives labels to its end.
+        "plan" gives the labels of the paper. Where a system stays down once it has fallen, as the
+        arm does, "plan" or "both" are better: see ``docs/labels.md``.
     exploring_k : float, default=6.0
         ``k`` of the planner from round 1 on. Not infinite, so that plans also go where the
         estimator is wrong, and the next round finds out. Little hangs on it: 1, 3, 6, 10 and
