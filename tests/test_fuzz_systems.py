@@ -125,6 +125,7 @@ DOORS = {
     "Car.execute": made(
         CAR.execute,
         {"states": np.append(FREE, [0.0, 0.0])[None], "commands": np.zeros((1, 3))},
+        names={"states": "(states|commands)"},
         states=rows(1, 5),
         commands=rows(1, 3),
     ),
@@ -249,7 +250,7 @@ DOORS = {
             "rays": np.eye(2),
             "reach": 2.0,
         },
-        obstacles=choices,
+        obstacles=choices.filter(lambda value: not callable(value)),
         origins=rows(2, 2),
         rays=rows(2, 2),
         reach=numbers,

@@ -158,7 +158,7 @@ def _check_start(scene: Scene) -> None:
             f"The rope starts in collision with {_nearest_name(scene, rope[worst])!r}: hanging "
             f"between the grippers it passes {rope[worst].round(4).tolist()}, "
             f"{distances[worst]:.3g} m from it, and its radius is {ROPE_RADIUS} m. Move the "
-            "grippers of start or that obstacle."
+            "grippers of start or that obstacle, or change rope_length."
         )
 
 
