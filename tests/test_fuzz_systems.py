@@ -122,12 +122,11 @@ DOORS = {
     "PlanarArm.joint_positions": made(
         ARM.joint_positions, {"configurations": np.zeros((2, 3))}, configurations=rows(2, 3)
     ),
-    "Car.execute": made(
+    "Car.execute": Door(
         CAR.execute,
-        {"states": np.append(FREE, [0.0, 0.0])[None], "commands": np.zeros((1, 3))},
+        lambda: {"states": np.append(FREE, [0.0, 0.0])[None], "commands": np.zeros((1, 3))},
+        {"states": rows(1, 5), "commands": rows(1, 3)},
         names={"states": "(states|commands)"},
-        states=rows(1, 5),
-        commands=rows(1, 3),
     ),
     "Car.trace": made(
         CAR.trace,
