@@ -146,13 +146,16 @@ def test_the_ropes_features_have_names(kind):
     if kind == "vector":
         changed = found["free_parts_after"] - found["free_parts_before"]
         assert found["free_parts_change"] == changed
+        free, occupied = found["free_parts_before"][0], found["occupied_parts_before"][0]
+        assert found["parts_before"][0] == free + occupied > max(free, occupied)
         return
     assert found["motion_a_up"][0] == pytest.approx(0.8)
     assert found["motion_b_up"][0] == 0
     assert found["pbd1_length"][0] > 0.5
     assert found["depth_of_rope_before"][0] > 0
-    # Offsets from the band to where the rope is are downwards.
-    assert found["pbd0_offset8_up"][0] < 0
+    # The rope hangs below the middle of the band.
+    assert found["pbd0_offset8_up"][0] < -1
+    assert max(abs(found[f"pbd0_offset8_{way}"][0]) for way in ("along", "left")) < 0.5
 
 
 def test_voxels_have_no_names():
