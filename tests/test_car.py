@@ -327,7 +327,8 @@ def test_bad_input_is_named():
         with pytest.raises(ValueError, match=r"poses .* of shape \(n, 3\), got the shape \(3,\)"):
             method(np.zeros((1, 3)), np.zeros(3))
     with pytest.raises(ValueError, match="poses"):
-        car.clearance([[0, 0, 0]])
+        car.clearance([[0, 0]])
+    assert car.clearance([[0, 0, 0]]).shape == (1,), "lists of whole numbers will do"
     with pytest.raises(ValueError, match="states must have the shape"):
         car.execute([1, 1, 0, 0, 0], np.zeros((1, 3)))
     with pytest.raises(ValueError, match=r"commands must have the shape \(1, 3\)"):
