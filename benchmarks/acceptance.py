@@ -24,7 +24,7 @@ import numpy as np
 
 from benchmarks.arm.__main__ import main as make_arm
 from benchmarks.car.__main__ import main as make_car
-from benchmarks.rope.table1 import MODELS
+from benchmarks.rope.table1 import COLUMNS
 from examples.own_systems.suspended_load import SuspendedLoad
 from examples.own_systems.tractor_trailer import TractorTrailer
 from planners import BiasedRRT, BiasedRRTConnect, Share
@@ -152,7 +152,7 @@ def car_model(out: Path) -> Any:
 
 def rope_model(out: Path) -> Any:
     """Load the model that comes with the benchmarks."""
-    return load_estimator(MODELS / "rope_ours.joblib")
+    return load_estimator(COLUMNS["ours"])
 
 
 def tractor_model(out: Path) -> Any:

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.plan_worth import measured_systems
+from benchmarks import acceptance
+from benchmarks.plan_worth import measured_systems, peg
 from benchmarks.plan_worth.__main__ import main
 from benchmarks.plan_worth.measures import calibration_error, error_of_the_truth
-from benchmarks.plan_worth.peg import peg_rope
 
 
 def test_the_calibration_error_is_the_mean_gap_of_ten_bins():
@@ -42,8 +42,23 @@ def test_a_table_a_picture_and_restarts(tmp_path, monkeypatch, capsys):
 
 
 def test_pegs_stand_in_the_way():
-    rope = peg_rope(0)
+    rope = peg.peg_rope(0)
     problem = rope.sample_problem(1)
     assert problem.goal[0, 2] < -0.1 < problem.start.grippers[0, 2]
-    peg = rope.scene.obstacles[1]
-    assert peg.center[2] + peg.half_length == pytest.approx(-0.05)
+    thin = rope.scene.obstacles[1]
+    assert thin.center[2] + thin.half_length == pytest.approx(-0.05)
+
+
+def n_features(rope):
+    reduced = rope.reduce(rope.scene_problem().start)[None]
+    return rope.features(reduced, reduced).shape[1]
+
+
+def test_benchmarks_find_the_rope_models_that_come_with_them(tmp_path):
+    measured = measured_systems.SYSTEMS["rope"]
+    classifier = measured.classifier(tmp_path, 1)
+    assert classifier.n_features_in_ == n_features(measured.system(0))
+    assert peg.planner("ours").estimator.n_features_in_ == n_features(peg.peg_rope(0))
+    for problem in (acceptance.simple_hook, acceptance.engine_assembly):
+        rope, _ = problem(0, 0)
+        assert acceptance.rope_model(tmp_path).n_features_in_ == n_features(rope)

@@ -10,13 +10,13 @@ from typing import Any
 import joblib
 import numpy as np
 
+from benchmarks.rope.table1 import COLUMNS
 from examples.own_systems.suspended_load import SuspendedLoad
 from examples.own_systems.tractor_trailer import TractorTrailer
 from planners import BiasedRRT, BiasedRRTConnect
 from reliability import TransitionReliabilityClassifier, collect_transitions, load_estimator
 from systems import Car, PlanarArm, Problem, Rope, System, random_car_scene, random_rope_scene
 
-ROPE_MODEL = Path(__file__).parents[1] / "rope" / "models" / "rope_vector.joblib"
 # ``make car`` trains it. After one round without a classifier no plan is found for the car.
 CAR_MODEL = Path("build/car/car.joblib")
 TRAINING_SEED = 31
@@ -90,7 +90,7 @@ _RRT = BiasedRRT(None, k=10.0, max_iterations=5000)
 SYSTEMS = {
     "arm": MeasuredSystem(PlanarArm(), _CONNECT, 0.1, 300, (400, 300, 750)),
     "car": MeasuredSystem(_car, _CAR, 0.3, CAR_MODEL, (300, 200, 600)),
-    "rope": MeasuredSystem(_rope, _RRT, 0.025, ROPE_MODEL, (120, 80, 120)),
+    "rope": MeasuredSystem(_rope, _RRT, 0.025, COLUMNS["vector"], (120, 80, 120)),
     "tractor": MeasuredSystem(TractorTrailer(), _RRT, 0.1, 300, (300, 200, 545)),
     "load": MeasuredSystem(SuspendedLoad(), _CONNECT, 0.3, 300, (500, 400, 700)),
 }

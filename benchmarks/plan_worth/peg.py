@@ -17,11 +17,11 @@ import numpy as np
 from sklearn.dummy import DummyClassifier
 from sklearn.metrics import roc_auc_score
 
+from benchmarks.rope.table1 import COLUMNS
 from planners import BiasedRRT, Evaluation, evaluate
 from reliability import load_estimator
 from systems import Box, Cylinder, Problem, Rope, Scene
 
-MODEL = Path(__file__).parents[1] / "rope" / "models" / "rope_ours.joblib"
 TOLERANCE = 0.025
 RANDOM_STATE = 78
 HEAD = -0.05
@@ -69,7 +69,7 @@ def main(arguments: list[str] | None = None) -> None:
 def planner(name: str) -> BiasedRRT:
     """Return a planner with the trained model, or with the reduced model alone."""
     if name == "ours":
-        return BiasedRRT(None, load_estimator(MODEL), k=10, max_iterations=20_000)
+        return BiasedRRT(None, load_estimator(COLUMNS["ours"]), k=10, max_iterations=20_000)
     trusting = DummyClassifier(strategy="constant", constant=1)
     trusting.fit(np.zeros((2, N_FEATURES)), [0, 1])
     return BiasedRRT(None, trusting, k=10, accuracy=1.0, max_iterations=20_000)
