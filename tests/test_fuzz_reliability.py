@@ -70,7 +70,10 @@ BOOSTING = FastHistGradientBoostingClassifier(max_iter=2, min_samples_leaf=2).fi
 MADE = DATA[[0, 1, 2, 3] * 4]
 MADE.plan = np.repeat(np.arange(4), 4)
 # What scikit-learn's checks say without the argument's name.
-OF_SKLEARN = r"(X|y|[Ii]nput|array|[Ff]ound|features|sample|complex|float|string|dtype|numeric)"
+OF_SKLEARN = (
+    r"(X|y|[Ii]nput|array|[Ff]ound|features|sample|complex|Complex|float|string|dtype|numeric"
+    r"|target)"
+)
 
 
 def transitions(**given):
@@ -193,7 +196,10 @@ DOORS = {
             "propagate": no_functions,
             "close": no_functions,
         },
-        names={"commands": "(commands|propagate|executed)", "executed": "(executed|propagate)"},
+        names={
+            "commands": "(commands?|propagate|executed)",
+            "executed": "(executed|propagate|reduced)",
+        },
     ),
     "collect_transitions": Door(
         lambda **given: collect_transitions(**given).reduced,
