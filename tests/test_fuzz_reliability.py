@@ -220,6 +220,7 @@ DOORS = {
             **dict.fromkeys(["exploring_k", "n_after", "random_state"], numbers),
         },
         share=0.2,
+        names={"random_state": "(random_state|n_plans)"},  # since few plans are drawn here
     ),
     "diagnose": Door(
         lambda **given: diagnose(**given).accuracy,
@@ -258,7 +259,7 @@ DOORS = {
             "hidden_layer_sizes": choices | arrays(1),
         },
         # scikit-learn's checks raise TypeErrors.
-        errors=(ValueError, TypeError, FloatingPointError, OSError),
+        errors=(ValueError, TypeError, FloatingPointError, OverflowError, OSError),
         share=0.4,
         names=dict.fromkeys(["X", "y"], OF_SKLEARN),
     ),
@@ -267,7 +268,7 @@ DOORS = {
             getattr(estimator, method),
             lambda: {"X": X.copy()},
             {"X": rows(4, 3)},
-            errors=(ValueError, TypeError),
+            errors=(ValueError, TypeError, OverflowError),
             names={"X": OF_SKLEARN},
         )
         for name, estimator in (("Classifier", CLASSIFIER), ("FastHistGradientBoosting", BOOSTING))
