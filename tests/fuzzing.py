@@ -174,11 +174,11 @@ def _outcome(door: Door, argument: str, value: Any) -> str:
 
 def _is_extreme(value: Any) -> bool:
     """Say whether values are so large, or no numbers, that NaN may come of them."""
-    if np.iscomplexobj(value):
-        return True
     try:
+        if np.iscomplexobj(value):
+            return True
         array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
+    except (AttributeError, TypeError, ValueError, OverflowError):
         return False
     return not (np.abs(array) < 1e100).all()
 

@@ -184,8 +184,9 @@ def straight_moves(
     """Add displacements to poses, and check that the footprint touches nothing on the way.
 
     Displacements of more than ``LONGEST_MOTION`` are none that a car could make, would be checked
-    for ever, and are not free. Along the others, position and heading change in proportion. Each check is followed by the
-    longest motion that the clearance there allows, so that no contact is missed in between.
+    for ever, and are not free. Along the others, position and heading change in proportion. Each
+    check is followed by the longest motion that the clearance there allows, so that no contact is
+    missed in between.
 
     Parameters
     ----------
