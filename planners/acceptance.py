@@ -197,9 +197,9 @@ def warn_if_permissive(k: float, p_acc: float, stacklevel: int) -> None:
         return
     stricter = 10 if fixed_share(10, p_acc) < _PERMISSIVE / 10 else np.inf
     message = (
-        f"k={k:g} with p_acc {p_acc:.2f} accepts {100 * share:.2g} % of the transitions that the "
-        f"estimator calls Unreliable, so that plans may hold some; k={stricter:g} accepts "
-        f"{100 * fixed_share(stricter, p_acc):.2g} %."
+        f"k={float(k):g} with p_acc {p_acc:.2f} accepts {100 * share:.2g} % of the transitions "
+        "that the estimator calls Unreliable, so that plans may hold some; "
+        f"k={stricter:g} accepts {100 * fixed_share(stricter, p_acc):.2g} %."
     )
     # Python itself forgets what it has shown whenever a warning filter changes, which some
     # estimators do each time that they are asked.

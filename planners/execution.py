@@ -171,7 +171,7 @@ def execute(
     if not isinstance(system, System):
         raise ValueError(f"system must be a System, got {system!r}.")
     SceneFamily(system).check_planner(planner)
-    _check_problem(problem, system)
+    problem = _checked_problem(problem, system)
     run = _Run(system, planner, problem, float(tolerance))
     try:
         status = run.to_the_end(int(max_replans))
@@ -186,11 +186,13 @@ def check_max_replans(value: Any) -> None:
         raise ValueError(f"max_replans must be an integer of at least 0, got {value!r}.")
 
 
-def _check_problem(problem: Any, system: System) -> None:
+def _checked_problem(problem: Any, system: System) -> Problem:
     if not isinstance(problem, Problem):
         raise ValueError(f"problem must be a Problem, got {problem!r}.")
-    if not isinstance(problem.goal, GoalRegion):
-        as_array(problem.goal, "problem.goal", (None, system.configuration_dim))
+    if isinstance(problem.goal, GoalRegion):
+        return problem
+    goals = as_array(problem.goal, "problem.goal", (None, system.configuration_dim))
+    return Problem(problem.start, goals)
 
 
 @dataclass(eq=False)

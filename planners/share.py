@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from systems.validation import is_integer
+from systems.validation import MOST, is_integer
 
 
 class Share(NamedTuple):
@@ -35,8 +35,8 @@ class Share(NamedTuple):
         """
         from scipy.stats import binomtest
 
-        if not is_integer(total) or total < 0:
-            raise ValueError(f"total must be an integer of at least 0, got {total!r}.")
+        if not is_integer(total) or not 0 <= total <= MOST:
+            raise ValueError(f"total must be an integer from 0 to 2**63 - 1, got {total!r}.")
         if not is_integer(n) or not 0 <= n <= total:
             raise ValueError(f"n must be an integer from 0 to total, {total}, got {n!r}.")
         if total == 0:

@@ -194,6 +194,7 @@ class SuccessCalibration(BaseEstimator):
         check_is_fitted(self)
         _check_between_0_and_1(share, "share")
         _check_between_0_and_1(confidence, "confidence")
+        share, confidence = float(share), float(confidence)
         y = _checked_outcomes(results, succeeded)
         probability = self.predict_proba(results)[:, 1]
         levels = self.levels_[self._first_level(len(y), share, confidence) :]

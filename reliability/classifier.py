@@ -228,7 +228,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         ModelFileError
             If ``checkpoint`` is damaged, or a file of another training.
         FloatingPointError
-            If the loss stops being finite.
+            If the loss or a weight stops being finite.
 
         Warns
         -----
@@ -257,6 +257,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         )
         validated = held_out.select(held_out.index[weight[held_out.index] > 0])
         logits = self._logits_of(validated).astype(np.float64)
+        self._check_finite(logits)
         is_second = validated.target[validated.index] == 1
         factor = temperature_factor(logits, is_second, loss_weight[validated.index])
         self._inference.soften(factor)
@@ -351,6 +352,15 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         """Raise ``ValueError`` if the trained weights do not fit together, as in a damaged file."""
         check_is_fitted(self)
         self._inference.check(self.n_features_in_)
+
+    def _check_finite(self, logits: NDArray[np.float64]) -> None:
+        # The last step of training comes after the last loss.
+        try:
+            self.check_weights()
+        except ValueError as error:
+            raise FloatingPointError(f"Training diverged: {error}. Lower learning_rate.") from error
+        if not np.isfinite(logits).all():
+            raise FloatingPointError("Training diverged: the logits are NaN. Lower learning_rate.")
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Refuse the state of another format."""

@@ -52,6 +52,8 @@ def describe(thing: Any) -> Any:
     """
     if thing is None or isinstance(thing, bool | int | float | str):
         return thing.value if isinstance(thing, Enum) else thing
+    if isinstance(thing, np.longdouble | np.clongdouble):  # whose item is itself
+        return describe(thing.astype(np.complex128 if np.iscomplexobj(thing) else np.float64))
     if isinstance(thing, np.generic):
         return describe(thing.item())
     if isinstance(thing, np.ndarray):

@@ -10,7 +10,7 @@ from sklearn.model_selection import GroupShuffleSplit, ShuffleSplit
 from sklearn.utils import compute_class_weight
 from sklearn.utils.multiclass import type_of_target
 
-from systems.validation import as_numbers
+from systems.validation import as_any_array, as_numbers
 
 
 def encode_labels(y: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.intp]]:
@@ -87,9 +87,10 @@ def hold_out(
 
 
 def _checked_groups(groups: ArrayLike, n_rows: int) -> NDArray[Any]:
-    ids = np.asarray(groups)
-    # Whatever else can't be put in order can't be told apart by np.unique.
-    if ids.shape != (n_rows,) or (ids.dtype.hasobject and len({type(one) for one in ids}) > 1):
+    ids = as_any_array(groups, "groups")
+    # np.unique tells apart what can be put in order.
+    in_order = ids.dtype.kind != "c" and len({type(one) for one in ids.ravel()}) <= 1
+    if ids.shape != (n_rows,) or not in_order:
         raise ValueError(
             f"groups must hold {n_rows} plan ids of one type, got {ids.dtype} of the shape "
             f"{ids.shape}."

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reliability.labels import RELIABLE, UNRELIABLE
+from systems.validation import MOST, as_any_array
 
 
 def checked_columns(columns: dict[str, Any], n: int) -> dict[str, NDArray[Any]]:
@@ -26,7 +27,7 @@ def checked_columns(columns: dict[str, Any], n: int) -> dict[str, NDArray[Any]]:
         raise ValueError(
             f"y must hold {RELIABLE} for Reliable and {UNRELIABLE} for Unreliable, got {wrong[0]}."
         )
-    executed = np.asarray(columns["executed"])
+    executed = as_any_array(columns["executed"], "executed")
     if executed.dtype != np.bool_ or executed.shape != (n,):
         raise ValueError(
             f"executed must hold {n} bools, got {executed.dtype} of shape {executed.shape}."
@@ -36,11 +37,13 @@ def checked_columns(columns: dict[str, Any], n: int) -> dict[str, NDArray[Any]]:
 
 def as_integers(values: Any, name: str, n: int) -> NDArray[np.int64]:
     """Return ``n`` integers as int64, or raise ``ValueError`` naming what they are."""
-    array = np.asarray(values)
+    array = as_any_array(values, name)
     if array.shape != (n,):
         raise ValueError(f"{name} must have the shape ({n},), got {array.shape}.")
     if array.dtype.kind not in "biu" and len(array):
         raise ValueError(f"{name} must hold integers, got {array.dtype}, such as {array[0]!r}.")
+    if len(array) and array.max() > MOST:
+        raise ValueError(f"{name} must hold integers below 2**63, got {array.max()}.")
     return array.astype(np.int64, copy=False)
 
 

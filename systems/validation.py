@@ -16,6 +16,8 @@ RandomState = None | int | np.random.SeedSequence | np.random.Generator | np.ran
 # Kinds of numpy types that become float64 without loss of meaning: booleans, integers, floats,
 # and Python objects, which may be numbers.
 REAL_KINDS = "biufO"
+# The largest integer of numpy and torch.
+MOST = 2**63 - 1
 
 
 def as_generator(random_state: RandomState) -> np.random.Generator:
@@ -75,9 +77,11 @@ def is_number(value: Any) -> TypeGuard[float]:
 
 
 def check_count(value: Any, name: str) -> None:
-    """Raise ``ValueError`` unless a value is a positive integer."""
+    """Raise ``ValueError`` unless a value is a positive integer that fits into 64 bits."""
     if not is_integer(value) or value < 1:
         raise ValueError(f"{name} must be a positive integer, got {value!r}.")
+    if value > MOST:
+        raise ValueError(f"{name} must be less than 2**63, got {value!r}.")
 
 
 def check_finite(value: Any, name: str) -> None:
@@ -239,6 +243,14 @@ def check_within_bounds(
             f"{name} must lie within the bounds {low.tolist()} to {high.tolist()}, "
             f"got {first.tolist()}."
         )
+
+
+def as_any_array(values: ArrayLike, name: str) -> NDArray[Any]:
+    """Return an array of whatever type numpy finds, or raise ``ValueError`` if it finds none."""
+    try:
+        return np.asarray(values)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must be an array, got {values!r}.") from error
 
 
 def as_numbers(values: ArrayLike, name: str) -> NDArray[np.float64]:

@@ -23,6 +23,8 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from sklearn.exceptions import NotFittedError
 
+from systems import SimulationDivergedError
+
 EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "25"))
 # What came of how many cases, by door.
 OUTCOMES: dict[str, Counter[str]] = {}
@@ -104,7 +106,7 @@ class Door:
     call: Callable[..., Any]
     right: Callable[[], dict[str, Any]]
     odd: dict[str, st.SearchStrategy[Any]]
-    errors: tuple[type[Exception], ...] = (ValueError, NotFittedError)
+    errors: tuple[type[Exception], ...] = (ValueError, NotFittedError, SimulationDivergedError)
     share: float = 1.0
     names: dict[str, str] = field(default_factory=dict)
 
@@ -162,7 +164,8 @@ def _outcome(door: Door, argument: str, value: Any) -> str:
     if complaint is None:
         assert _is_extreme(value) or not _has_nan(result), f"NaN of finite arguments: {result!r}"
         return "answered"
-    if isinstance(complaint, OSError):  # which names the file
+    # These name the file, and what the simulator said.
+    if isinstance(complaint, OSError | SimulationDivergedError):
         return type(complaint).__name__
     named = door.names.get(argument, argument)
     assert re.search(rf"\b({named})\b", str(complaint)), f"{complaint!r} does not name {named}"
@@ -172,8 +175,10 @@ def _outcome(door: Door, argument: str, value: Any) -> str:
 def _is_extreme(value: Any) -> bool:
     """Say whether values are so large, or no numbers, that NaN may come of them."""
     try:
+        if np.iscomplexobj(value):
+            return True
         array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
+    except (AttributeError, TypeError, ValueError, OverflowError):
         return False
     return not (np.abs(array) < 1e100).all()
 

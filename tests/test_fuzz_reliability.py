@@ -70,7 +70,10 @@ BOOSTING = FastHistGradientBoostingClassifier(max_iter=2, min_samples_leaf=2).fi
 MADE = DATA[[0, 1, 2, 3] * 4]
 MADE.plan = np.repeat(np.arange(4), 4)
 # What scikit-learn's checks say without the argument's name.
-OF_SKLEARN = r"(X|y|[Ii]nput|array|[Ff]ound|features|sample|complex|float|string|dtype|numeric)"
+OF_SKLEARN = (
+    r"(X|y|[Ii]nput|array|[Ff]ound|features|sample|complex|Complex|float|string|dtype|numeric"
+    r"|target)"
+)
 
 
 def transitions(**given):
@@ -193,7 +196,10 @@ DOORS = {
             "propagate": no_functions,
             "close": no_functions,
         },
-        names={"commands": "(commands|propagate|executed)", "executed": "(executed|propagate)"},
+        names={
+            "commands": "(commands?|propagate|executed)",
+            "executed": "(executed|propagate|reduced)",
+        },
     ),
     "collect_transitions": Door(
         lambda **given: collect_transitions(**given).reduced,
@@ -214,6 +220,7 @@ DOORS = {
             **dict.fromkeys(["exploring_k", "n_after", "random_state"], numbers),
         },
         share=0.2,
+        names={"random_state": "(random_state|n_plans)"},  # since few plans are drawn here
     ),
     "diagnose": Door(
         lambda **given: diagnose(**given).accuracy,
@@ -252,7 +259,7 @@ DOORS = {
             "hidden_layer_sizes": choices | arrays(1),
         },
         # scikit-learn's checks raise TypeErrors.
-        errors=(ValueError, TypeError, FloatingPointError, OSError),
+        errors=(ValueError, TypeError, FloatingPointError, OverflowError, OSError),
         share=0.4,
         names=dict.fromkeys(["X", "y"], OF_SKLEARN),
     ),
@@ -261,7 +268,7 @@ DOORS = {
             getattr(estimator, method),
             lambda: {"X": X.copy()},
             {"X": rows(4, 3)},
-            errors=(ValueError, TypeError),
+            errors=(ValueError, TypeError, OverflowError),
             names={"X": OF_SKLEARN},
         )
         for name, estimator in (("Classifier", CLASSIFIER), ("FastHistGradientBoosting", BOOSTING))

@@ -223,11 +223,11 @@ DOORS = {
         random_rope_scene, lambda: {"random_state": 1}, {"random_state": seeds}, share=0.1
     ),
     "directions": made(directions, {"angles": [0.0, 1.0]}, angles=rows(2)),
-    "to_body_frame": made(
+    "to_body_frame": Door(
         to_body_frame,
-        {"poses": np.zeros((2, 3)), "points": np.zeros((2, 2))},
-        poses=rows(2, 3),
-        points=rows(2, 2),
+        lambda: {"poses": np.zeros((2, 3)), "points": np.zeros((2, 2))},
+        {"poses": rows(2, 3), "points": rows(2, 2)},
+        names={"poses": "(poses|points)"},
     ),
     "from_body_frame": made(
         from_body_frame,
@@ -235,11 +235,11 @@ DOORS = {
         poses=rows(2, 3),
         places=rows(2, 2),
     ),
-    "motion_in_body_frame": made(
+    "motion_in_body_frame": Door(
         motion_in_body_frame,
-        {"poses": np.zeros((2, 3)), "next_poses": np.zeros((2, 3))},
-        poses=rows(2, 3),
-        next_poses=rows(2, 3),
+        lambda: {"poses": np.zeros((2, 3)), "next_poses": np.zeros((2, 3))},
+        {"poses": rows(2, 3), "next_poses": rows(2, 3)},
+        names={"poses": "(poses|next_poses)"},
     ),
     "ray_distances": made(
         ray_distances,

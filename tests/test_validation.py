@@ -61,7 +61,7 @@ def test_negative_seeds_are_refused(of, value):
         of(value)
 
 
-@pytest.mark.parametrize("value", [1, 10**30, np.uint8(1), np.int64(5)])
+@pytest.mark.parametrize("value", [1, 2**63 - 1, np.uint8(1), np.int64(5)])
 def test_counts_pass(value):
     check_count(value, "n")
 
@@ -70,6 +70,11 @@ def test_counts_pass(value):
 def test_other_counts_are_refused(value):
     with pytest.raises(ValueError, match="n must be a positive integer, got "):
         check_count(value, "n")
+
+
+def test_counts_fit_into_64_bits():
+    with pytest.raises(ValueError, match=r"n must be less than 2\*\*63, got 9223372036854775808"):
+        check_count(2**63, "n")
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from systems.validation import check_count, check_flag, check_number
+from systems.validation import check_count, check_flag, check_number, is_integer, is_number
 
 _COUNTS = ("max_epochs", "batch_size", "epochs_per_decay", "rows_per_epoch")
 
@@ -47,10 +47,11 @@ class Hyperparameters:
 
 
 def as_plain(value: Any) -> Any:
-    """Return Python's number for numpy's; a list or tuple becomes a tuple of such."""
+    """Return an int or float for any other number; a list or tuple becomes a tuple of such."""
     if isinstance(value, list | tuple):
         return tuple(as_plain(item) for item in value)
-    return value.item() if isinstance(value, np.generic) else value
+    plain = value.item() if isinstance(value, np.generic) else value
+    return float(plain) if is_number(plain) and not is_integer(plain) else plain
 
 
 def _check(given: dict[str, Any]) -> None:

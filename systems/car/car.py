@@ -211,7 +211,10 @@ class Car(System):
         outline : ndarray of shape (43, 2)
             x and y, in metres, in the scene's frame; the last point is the first again.
         """
-        x, y, heading = as_finite_array(pose, "pose", (None,))[:3]
+        numbers = as_finite_array(pose, "pose", (None,))
+        if len(numbers) < 3:
+            raise ValueError(f"pose must hold x, y and θ, got {numbers.tolist()}.")
+        x, y, heading = numbers[:3]
         rear, front = np.linspace([np.pi / 2, -np.pi / 2], [3 * np.pi / 2, np.pi / 2], 21).T
         around = np.concatenate([rear, front, rear[:1]])
         axle = np.repeat([0.0, WHEELBASE, 0.0], [21, 21, 1])

@@ -17,6 +17,8 @@ CAR_RADIUS = 0.15
 # A clearance below this counts as contact. Clearance is checked every 0.01 s of a drive, and
 # between two checks the footprint can enter an obstacle's corner by half of this at most.
 CONTACT = 1e-3
+# Metres that a point of the footprint moves at most in one displacement.
+LONGEST_MOTION = 1e4
 # Rounding of a displacement that was shortened to one step.
 STEP_ALLOWANCE = 1 + 1e-9
 
@@ -181,8 +183,10 @@ def straight_moves(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Add displacements to poses, and check that the footprint touches nothing on the way.
 
-    Along a displacement, position and heading change in proportion. Each check is followed by the
-    longest motion that the clearance there allows, so that no contact is missed in between.
+    Displacements of more than ``LONGEST_MOTION`` are none that a car could make, would be checked
+    for ever, and are not free. Along the others, position and heading change in proportion. Each
+    check is followed by the longest motion that the clearance there allows, so that no contact is
+    missed in between.
 
     Parameters
     ----------
@@ -205,8 +209,8 @@ def straight_moves(
         # No point of the footprint moves further than this.
         motion = np.sqrt(dx * dx + dy * dy) + WHEELBASE * abs(turn)
         along = 0.0
-        free[row] = True
-        while True:
+        free[row] = motion <= LONGEST_MOTION
+        while free[row]:
             x, y = poses[row, 0] + along * dx, poses[row, 1] + along * dy
             room = clearance(x, y, poses[row, 2] + along * turn, scene)
             if not room >= CONTACT:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from systems.features.directions import directions
-from systems.validation import as_finite_array
+from systems.validation import as_any_array, as_finite_array
 
 Array = NDArray[np.float64]
 PLANAR, SPATIAL = 3, 7
@@ -137,6 +137,6 @@ def _rotations(poses: Array) -> Rotation:
 
 
 def _points_of(points: ArrayLike, n: int, d: int) -> Array:
-    places = np.asarray(points)
+    places = as_any_array(points, "points")
     shape = (n, d) if places.ndim == 2 else (n, None, d)
     return as_finite_array(points, "points", shape)

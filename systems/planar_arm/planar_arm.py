@@ -158,6 +158,13 @@ class PlanarArm(System):
         Returns
         -------
         held : ndarray of bool of shape (n,)
+
+        Raises
+        ------
+        ValueError
+            If a configuration has the wrong shape or is not finite.
+        SimulationDivergedError
+            If MuJoCo reports a bad position, velocity or acceleration.
         """
         rows = as_finite_array(configurations, "configurations", (None, 3))
         simulation = _simulation()

@@ -80,6 +80,9 @@ class Scene:
         for field in ("bounds", "start", "goal"):
             object.__setattr__(self, field, _frozen_array(getattr(self, field), field))
         _check_scalars(self)
+        for field in ("rope_length", "max_stretch"):
+            if not isinstance(getattr(self, field), int):
+                object.__setattr__(self, field, float(getattr(self, field)))
         if not (self.bounds[0] < self.bounds[1]).all():
             raise ValueError(
                 "bounds must hold the lower corner and then the upper corner, got "
