@@ -2,9 +2,10 @@
 
 For each system, plans are made without a classifier, executed, and labelled in both ways, so that
 what differs is the labels and nothing else. The same boosted trees learn from each kind, and
-planners use them with the same k on problems that nothing was learned from. Everything is kept in
-``--out``: a run that was interrupted goes on where it stopped. ``docs/labels.md`` discusses the
-result.
+planners use them with the same k on problems that nothing was learned from. Where it says "cut",
+what Eq. 3 says after a plan's first mistake is left out
+(:meth:`reliability.Transitions.trim_unreliable_runs`). Everything is kept in ``--out``: a run that
+was interrupted goes on where it stopped. ``docs/labels.md`` discusses the result.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from reliability import (
 )
 from systems import Car, PlanarArm, Rope, random_car_scene
 
-KINDS = ("plan", "executed", "both")
+KINDS = ("plan", "plan, cut", "executed", "both", "both, cut")
 TRAINING_SEED, TEST_SEED, PROBLEM_SEED = 0, 1, 2
 TRAINING_SCENES, TEST_SCENES = range(20), range(100, 120)
 K, ITERATIONS = 10.0, 5000
@@ -115,7 +116,9 @@ def compare_labels(name: str, options: argparse.Namespace) -> None:
     ]
     print(f"\n{name}: {n_plans} plans to learn from, {n_test_plans} to test on")
     print("labels    transitions  Unreliable  of these diverged before  balanced accuracy")
-    evaluations = {"no classifier": _evaluated(template, "none", setting, n_problems, options)}
+    evaluations = {
+        "no classifier": _evaluated(template, folder / "none", setting, n_problems, options)
+    }
     for kind in KINDS:
         training, unseen = (_only(kind, data) for data in collected)
         estimator = FastHistGradientBoostingClassifier(random_state=0)
@@ -131,7 +134,9 @@ def compare_labels(name: str, options: argparse.Namespace) -> None:
         planner = setting.planner(
             None, estimator, k=K, accuracy=accuracy, max_iterations=ITERATIONS
         )
-        evaluations[kind] = _evaluated(planner, kind, setting, n_problems, options)
+        evaluations[kind] = _evaluated(
+            planner, folder / kind.replace(", ", "-"), setting, n_problems, options
+        )
     print(Evaluation.compare(evaluations))
 
 
@@ -141,13 +146,14 @@ def _lots(seeds: range) -> list[Car]:
 
 def _only(kind: str, data: Transitions) -> Transitions:
     """Select the labels of one kind."""
-    if kind == "both":
-        return data
-    return data[data.executed if kind == "executed" else ~data.executed]
+    if kind == "executed":
+        return data[data.executed]
+    chosen = data if kind.startswith("both") else data[~data.executed]
+    return chosen.trim_unreliable_runs(1) if kind.endswith("cut") else chosen
 
 
 def _evaluated(
-    planner: Any, name: str, setting: Setting, n_problems: int, options: argparse.Namespace
+    planner: Any, folder: Path, setting: Setting, n_problems: int, options: argparse.Namespace
 ) -> Evaluation:
     return evaluate(
         setting.tested,
@@ -156,6 +162,7 @@ def _evaluated(
         tolerance=setting.tolerance,
         n_jobs=options.jobs,
         random_state=PROBLEM_SEED,
+        path=folder,
     )
 
 
