@@ -100,12 +100,14 @@ def test_own_systems_goes_all_roads_and_counts_each(tmp_path):
     assert shown.splitlines()[-1] == again.splitlines()[-1]
 
 
-def test_labels_compares_the_same_executions_labelled_in_three_ways(tmp_path):
+def test_labels_compares_the_same_executions_labelled_in_several_ways(tmp_path):
     options = ("--systems", "suspended load", "--share", 0.05, "--out", tmp_path / "out")
     shown = run("-m", "benchmarks.labels", *options, cwd=tmp_path)
     rows = {
         kind: int(re.search(rf"^{kind} +([\d,]+) +[\d.]+%", shown, flags=re.M)[1].replace(",", ""))
-        for kind in ("plan", "executed", "both")
+        for kind in ("plan", "plan, cut", "executed", "both", "both, cut")
     }
+    assert rows["plan, cut"] < rows["plan"]
     assert rows["both"] == rows["plan"] + rows["executed"]
+    assert rows["both, cut"] == rows["plan, cut"] + rows["executed"]
     assert re.search(r"^executed +\d+ +\d+ .* : \d+  \(p = ", shown, flags=re.M)
