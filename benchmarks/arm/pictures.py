@@ -39,7 +39,7 @@ def draw_motions(
         Configurations, each of shape (T + 1, 3), by planner.
     path : Path
     """
-    figure, axes = plt.subplots(1, len(motions), figsize=(9.5, 4.8), layout="constrained")
+    figure, axes = plt.subplots(1, len(motions), figsize=(9.5, 5.2), layout="constrained")
     for axis, (name, (planned, executed)) in zip(axes, motions.items(), strict=True):
         _draw_poses(axis, arm.joint_positions(planned), 1.2, ["tab:gray"] * N_POSES, alpha=0.3)
         _draw_poses(
