@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planners.path import Path
+from planners.predicted_end import predicted_end
 from systems.system import System
 
 N_VARIANTS = 16
@@ -49,9 +50,5 @@ def plan_robustness(system: System, path: Path, rng: np.random.Generator) -> flo
 
 
 def _agrees(variant: System, path: Path) -> bool:
-    reduced = path.reduced[:1]
-    for command in path.commands:
-        reduced, valid = variant.propagate(reduced, command[None])
-        if not valid[0]:
-            return False
-    return bool(variant.close(path.reduced[-1:], reduced)[0])
+    end = predicted_end(variant, path.reduced[0], path.commands)
+    return end is not None and bool(variant.close(path.reduced[-1:], end[None])[0])

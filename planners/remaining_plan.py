@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from planners.predicted_end import predicted_end
 from systems.angles import shortest_way
 from systems.system import Array, System
 
@@ -34,11 +35,9 @@ def still_arrives(
     arrives : bool
         False if a transition is not valid.
     """
-    predicted = reduced[None]
-    for command in commands:
-        predicted, valid = system.propagate(predicted, command[None])
-        if not valid[0]:
-            return False
+    arrived = predicted_end(system, reduced, commands)
+    if arrived is None:
+        return False
     dim = system.configuration_dim
-    gap = shortest_way(predicted[0, :dim], end[:dim], system.angular)
+    gap = shortest_way(arrived[:dim], end[:dim], system.angular)
     return bool(np.linalg.norm(gap) <= tolerance)
