@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import ttest_1samp
 from sklearn.metrics import balanced_accuracy_score
+
+from reliability.plan_gains import SIGNIFICANCE, gains_of_plans, p_value
 
 # Below, a classifier is weak: 0.5 is chance, and 0.7 that of one that recognizes, for example, half
 # of the rarer label at a false alarm in ten.
@@ -16,7 +17,6 @@ WEAK_BALANCED_ACCURACY = 0.7
 # With fewer, a validation accuracy says too little to warn of it.
 _FEWEST_GROUPS = 50
 _FEWEST_OF_RARER_LABEL = 20
-_SIGNIFICANCE = 0.05
 
 
 class BaseRateWarning(UserWarning):
@@ -56,11 +56,7 @@ def beats_base_rate(
     weight = np.ones(len(label)) if weight is None else weight
     more_frequent = weighted_share(label == 1, weight) >= 0.5
     gain = right.astype(float) - (label == more_frequent)
-    _, number = np.unique(np.asarray(groups), return_inverse=True)
-    gains = np.bincount(number, weight * gain)
-    if np.ptp(gains) == 0:
-        return bool(gains[0] > 0)
-    return bool(ttest_1samp(gains, 0, alternative="greater").pvalue < _SIGNIFICANCE)
+    return p_value(gains_of_plans(weight * gain, groups), "greater") < SIGNIFICANCE
 
 
 def warn_if_no_better_than_base_rate(

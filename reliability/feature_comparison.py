@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import ttest_1samp
 from sklearn.frozen import FrozenEstimator
 
 from reliability.diagnosis import Diagnosis, check_arguments, judge
 from reliability.labels import RELIABLE
+from reliability.plan_gains import SIGNIFICANCE, gains_of_plans, p_value
 from reliability.transitions import Transitions, named_features
 
-SIGNIFICANCE = 0.05
 _COMPARED = ("balanced_accuracy", "reliable_recall", "onset_recall")
 
 
@@ -188,15 +187,7 @@ def _p_values(
     # Each transition's part in the figure: the mean of both labels' recalls, or one label's recall.
     balanced = np.where(reliable, 1 / reliable.sum(), 1 / (~reliable).sum())
     weights = dict(zip(_COMPARED, (balanced, reliable, onset), strict=True))
-    _, plan = np.unique(transitions.plan, return_inverse=True)
     return {
-        name: min(1.0, n_comparisons * _p_value(np.bincount(plan, gain * weight).astype(float)))
+        name: min(1.0, n_comparisons * p_value(gains_of_plans(gain * weight, transitions.plan)))
         for name, weight in weights.items()
     }
-
-
-def _p_value(gains: NDArray[np.float64]) -> float:
-    """Return how probable such gains of plans are if there is none in truth."""
-    if np.ptp(gains) == 0:
-        return float(gains[0] == 0)
-    return float(ttest_1samp(gains, 0).pvalue)

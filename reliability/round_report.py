@@ -8,13 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest, ttest_1samp
+from scipy.stats import binomtest
 
 from reliability.item_files import Item
 from reliability.plan_execution import DIVERGED, EXECUTED
-
-# A difference counts as more than chance if chance makes one as large this rarely.
-SIGNIFICANCE = 0.05
+from reliability.plan_gains import SIGNIFICANCE, gains_of_plans, p_value
 
 
 @dataclass(frozen=True)
@@ -144,7 +142,8 @@ def is_better(
 ) -> bool:
     """Say whether balanced accuracy is higher than before on the same rows, beyond chance.
 
-    Each plan's share of the difference is one observation, since rows of one plan are alike.
+    Each plan's share of the difference is one observation. Plans that all have the same share, such
+    as a single plan, do not show that it is more than chance.
 
     Parameters
     ----------
@@ -155,11 +154,8 @@ def is_better(
     if len(np.unique(y)) < 2:
         return False
     difference = right.astype(float) - right_before
-    _, number = np.unique(plan, return_inverse=True)
-    shares = np.bincount(number, difference / np.bincount(y)[y])
-    if np.ptp(shares) == 0:
-        return False
-    return bool(ttest_1samp(shares, 0, alternative="greater").pvalue < SIGNIFICANCE)
+    shares = gains_of_plans(difference / np.bincount(y)[y], plan)
+    return bool(np.ptp(shares) > 0 and p_value(shares, "greater") < SIGNIFICANCE)
 
 
 def _told(improved: bool | None) -> str:
