@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from reliability.base_rate import WEAK_BALANCED_ACCURACY
+from reliability.listing import listed
 
 # Figures of so few plans change with every plan.
 FEW_PLANS = 20
@@ -16,7 +17,6 @@ COSTLY_RECALL = 0.7
 POOR_CALIBRATION = 0.1
 # More labels of no content than this, and the others are too few to learn from.
 _MOSTLY_DIVERGED = 2 / 3
-_MOST_LISTED = 8
 _MOST_WARNINGS = 5
 
 
@@ -87,7 +87,7 @@ def _about_features(diagnosis: Any) -> Iterable[str]:
             for first, later in diagnosis.duplicate_features
         ]
         yield (
-            f"Some features are equal in all transitions ({_listed(pairs)}): leave one out, or "
+            f"Some features are equal in all transitions ({listed(pairs)}): leave one out, or "
             "mend it if they should differ."
         )
     if diagnosis.unscaled_features:
@@ -200,10 +200,4 @@ def _better_features() -> str:
 def _columns(diagnosis: Any, columns: tuple[int, ...]) -> str:
     called = diagnosis.feature_names or range(len(diagnosis.feature_ranges))
     one, names = len(columns) == 1, [called[column] for column in columns]
-    return f"{'Feature' if one else 'Features'} {_listed(names)} {'has' if one else 'have'}"
-
-
-def _listed(things: Iterable[object]) -> str:
-    words = [str(thing) for thing in things]
-    more = len(words) - _MOST_LISTED
-    return ", ".join(words[:_MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
+    return f"{'Feature' if one else 'Features'} {listed(names)} {'has' if one else 'have'}"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_MOST_LISTED = 8
+from reliability.listing import listed
 
 
 @dataclass(frozen=True)
@@ -83,14 +83,14 @@ def columns_to_ask(
         missing = [name for name in fitted if name not in set(names)]
         if missing:
             raise ValueError(
-                f"estimator was fitted on features that {whose} does not have: {_listed(missing)}. "
+                f"estimator was fitted on features that {whose} does not have: {listed(missing)}. "
                 "Fit it on transitions of this system."
             )
         order = tuple(map(list(names).index, fitted))
         return Columns(None if order == tuple(range(n_features)) else order, fitted)
     expected = getattr(estimator, "n_features_in_", n_features)
     if expected != n_features:
-        by_name = "" if fitted is None else f" ({_listed(fitted)})"
+        by_name = "" if fitted is None else f" ({listed(fitted)})"
         remedy = "fit it on transitions of this system."
         if fitted is not None and names is None:
             remedy = (
@@ -147,8 +147,3 @@ def _has_pandas() -> bool:
     except ImportError:
         return False
     return True
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = len(names) - _MOST_LISTED
-    return ", ".join(list(names)[:_MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
