@@ -18,16 +18,9 @@ LARGEST_MISS = 1e-6
 
 def check_samples(system: System, seed: int, n: int) -> None:
     """Check ``sample_configurations``."""
-    samples, again = (
-        call(system, "sample_configurations", np.random.default_rng(seed), n) for _ in range(2)
-    )
+    samples = call(system, "sample_configurations", np.random.default_rng(seed), n)
     check_array(system, "sample_configurations", samples, (n, system.configuration_dim))
-    if not np.array_equal(samples, again):
-        fail(
-            system,
-            "sample_configurations",
-            "must draw from nothing but the given generator: the same generator gave two results.",
-        )
+    _check_drawn_again(system, "sample_configurations", samples, seed, n)
     if not _within(samples, system.bounds).all():
         fail(system, "sample_configurations", f"left the bounds: {samples.tolist()}.")
     none = call(system, "sample_configurations", np.random.default_rng(seed), 0)
@@ -100,15 +93,10 @@ def draw_configurations(system: System, rng: np.random.Generator, n: int) -> Arr
 
 
 def _check_region(system: System, region: GoalRegion, seed: int) -> None:
-    drawn, again = (call(region, "sample", np.random.default_rng(seed), N_GOALS) for _ in range(2))
+    drawn = call(region, "sample", np.random.default_rng(seed), N_GOALS)
     n = len(drawn) if isinstance(drawn, np.ndarray) and len(drawn) <= N_GOALS else N_GOALS
     check_array(region, "sample", drawn, (n, system.configuration_dim))
-    if not np.array_equal(drawn, again):
-        fail(
-            region,
-            "sample",
-            "must draw from nothing but the given generator: the same generator gave two results.",
-        )
+    _check_drawn_again(region, "sample", drawn, seed, N_GOALS)
     if not _within(drawn, system.bounds).any():
         fail(
             region,
@@ -122,6 +110,16 @@ def _check_region(system: System, region: GoalRegion, seed: int) -> None:
             region,
             "distance",
             f"must be 0 for what sample drew, and positive outside; got {distance.tolist()}.",
+        )
+
+
+def _check_drawn_again(drawer: Any, method: str, drawn: Array, seed: int, n: int) -> None:
+    """Demand that a generator with the same seed gives the same n draws again."""
+    if not np.array_equal(drawn, call(drawer, method, np.random.default_rng(seed), n)):
+        fail(
+            drawer,
+            method,
+            "must draw from nothing but the given generator: the same generator gave two results.",
         )
 
 
