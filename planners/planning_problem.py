@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from planners.check_transition import CheckTransition
 from planners.goals import BATCH, MOST_BATCHES, GoalSampler, possible_goals, trusted
-from planners.standing_still import can_stay, is_only_configuration
+from planners.standing_still import can_stay
 from systems.angles import wrap_columns
 from systems.goal_region import GoalRegion
 from systems.system import Array, System
@@ -75,7 +75,7 @@ class PlanningProblem:
         """
         if self.sampler is not None:
             return self._with_trusted_sampler(self.sampler, check)
-        if len(self.goals) == 1 or not is_only_configuration(self.system):
+        if len(self.goals) == 1:
             return self
         return replace(self, goals=_most_trusted(self.system, self.goals, check))
 
