@@ -59,7 +59,7 @@ class Evaluation:
     n_transitions: NDArray[np.int64]
     n_replans: NDArray[np.int64]
     success_probability: Array
-    plans: list[Any] = field(default_factory=list, repr=False)
+    plans: list[Any] = field(default_factory=list)
 
     @classmethod
     def of(
