@@ -112,7 +112,7 @@ class Diagnosis:
 
         References
         ----------
-        McConachie et al. 2020, Algorithm 2.
+        McConachie et al. 2020, Algorithm 1.
         """
         return 1 - self.unreliable_recall * (1 - math.exp(-k * self.accuracy))
 

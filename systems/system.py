@@ -320,8 +320,9 @@ class System(ABC):
         Returns
         -------
         variant : System or None
-            Most easily a copy with other parameters; planners ask its ``propagate`` only. None,
-            the default, if there is nothing to vary: planners then leave this out.
+            Most easily a copy with other parameters; planners ask only its ``propagate``, and its
+            ``close`` once at the end. None, the default, if there is nothing to vary: planners
+            then leave this out.
         """
         return None
 
