@@ -19,12 +19,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
 
 from benchmarks.arm.__main__ import main as make_arm
 from benchmarks.car.__main__ import main as make_car
 from benchmarks.rope.table1 import COLUMNS
+from benchmarks.shared_steps import learned_classifier, succeeds
 from examples.own_systems.suspended_load import SuspendedLoad
 from examples.own_systems.tractor_trailer import TractorTrailer
 from planners import BiasedRRT, BiasedRRTConnect, Share
@@ -32,22 +32,12 @@ from reliability import (
     Item,
     Job,
     ResumableStore,
-    TransitionReliabilityClassifier,
     code_digest,
-    collect_transitions,
     describe,
     load_estimator,
     run_jobs,
 )
-from systems import (
-    Car,
-    PlanarArm,
-    Problem,
-    Rope,
-    SimulationDivergedError,
-    System,
-    random_car_scene,
-)
+from systems import Car, PlanarArm, Problem, Rope, System, random_car_scene
 
 # Of problems to choose settings on, of those of the table, and of the data to learn from.
 TUNING_SEED, TEST_SEED, DATA_SEED = 31, 32, 33
@@ -167,21 +157,14 @@ def load_model(out: Path) -> Any:
 
 def own_model(system: System, planner: type, folder: Path) -> Any:
     """Learn from executed plans, as one would for any system, or load what was learned."""
-    path = folder / "model.joblib"
-    if not path.exists():
-        data = collect_transitions(
-            system,
-            planner(system),
-            600,
-            labels="executed",
-            random_state=DATA_SEED,
-            path=folder / "transitions",
-            verbose=1,
-        )
-        classifier = TransitionReliabilityClassifier(random_state=DATA_SEED)
-        classifier.fit(data.features(system), data.y, groups=data.plan)
-        joblib.dump(classifier, path)
-    return load_estimator(path)
+    return learned_classifier(
+        folder / "model.joblib",
+        system,
+        planner(system),
+        600,
+        data_seed=DATA_SEED,
+        classifier_seed=DATA_SEED,
+    )
 
 
 OF_CAR = {"transitions_per_edge": 1, "max_iterations": 8000}
@@ -225,7 +208,8 @@ class Trial:
         return Item(
             {
                 "solved": plan.success,
-                "succeeded": plan.success and self._succeeds(system, problem, plan.commands),
+                "succeeded": plan.success
+                and succeeds(system, problem, plan.commands, scenario.tolerance),
                 "unreliable": plan.success and bool((plan.reliability < 0.5).any()),
                 "seconds": plan.planning_time + plan.simplification_time,
                 "n_checked": plan.n_checked,
@@ -233,13 +217,6 @@ class Trial:
                 "n_accepted_unreliable": plan.n_accepted_unreliable,
             }
         )
-
-    def _succeeds(self, system: System, problem: Problem, commands: np.ndarray) -> bool:
-        try:
-            final = system.rollout(problem.start, commands).states[-1]
-        except SimulationDivergedError:
-            return False
-        return bool(system.succeeded(final, problem.goal, SCENARIOS[self.scenario].tolerance))
 
 
 def main(arguments: list[str] | None = None) -> None:

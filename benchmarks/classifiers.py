@@ -23,9 +23,11 @@ from sklearn.model_selection import GroupShuffleSplit
 from threadpoolctl import threadpool_limits
 from torch import nn
 
+from benchmarks.calibration_error import calibration_error
+from benchmarks.shared_steps import kind_of_planner
 from examples.own_systems.suspended_load import SuspendedLoad
 from examples.own_systems.tractor_trailer import TractorTrailer
-from planners import BiasedRRT, BiasedRRTConnect, evaluate
+from planners import evaluate
 from reliability import (
     FastHistGradientBoostingClassifier,
     TransitionReliabilityClassifier,
@@ -103,7 +105,7 @@ def collect(name: str, options: argparse.Namespace) -> tuple[Transitions, Transi
 
 def make_planner(system: System, estimator: Any = None) -> Any:
     """Return the planner for a system, with an estimator or without."""
-    kind = BiasedRRTConnect if system.reduced_dim == system.configuration_dim else BiasedRRT
+    kind = kind_of_planner(system)
     if estimator is None:
         return kind(system)
     return kind(system, estimator, k=K, max_iterations=MOST_ITERATIONS)
@@ -172,16 +174,9 @@ def accuracy(
     return (
         float(balanced_accuracy_score(test.y, predicted)),
         float(classifier.validation_accuracy_ - np.mean(predicted == test.y)),
-        calibration_error(test.y == 1, probability),
+        calibration_error(probability, test.y == 1),
         told,
     )
-
-
-def calibration_error(positive: np.ndarray, probability: np.ndarray) -> float:
-    """Return the expected calibration error in ten bins of equal width."""
-    bins = np.minimum((10 * probability).astype(int), 9)
-    gaps = np.bincount(bins, probability - positive, minlength=10)
-    return float(np.abs(gaps).sum() / len(positive))
 
 
 def _mean_and_spread(values: tuple[float, ...]) -> str:

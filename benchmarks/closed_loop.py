@@ -20,22 +20,15 @@ from typing import Any, NamedTuple
 import joblib
 import numpy as np
 
+from benchmarks.shared_steps import ReachingArm
 from examples.own_systems.suspended_load import SuspendedLoad
 from examples.own_systems.tractor_trailer import TractorTrailer
 from planners import BiasedRRT, BiasedRRTConnect, Evaluation, evaluate
 from reliability import FastHistGradientBoostingClassifier, learn_in_rounds, load_estimator
-from systems import Car, PlanarArm, Problem, System, random_car_scene
+from systems import Car, System, random_car_scene
 
 SYSTEMS = ("arm", "car", "tractor_trailer", "suspended_load")
 LEARNING_SEED, PROBLEM_SEED = 0, 16
-
-
-class ReachingArm(PlanarArm):
-    """The arm with the problems of the paper's experiment."""
-
-    def sample_problem(self, random_state: Any = None) -> Problem:
-        """Draw a start at rest and a point for the arm's tip."""
-        return self.sample_reaching_problem(random_state)
 
 
 def car_in_random_scene(random_state: int) -> Car:

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 from sklearn.metrics import balanced_accuracy_score
 
+from benchmarks.shared_steps import ReachingArm
 from examples.own_systems.suspended_load import SuspendedLoad
 from examples.own_systems.tractor_trailer import TractorTrailer
 from planners import BiasedRRT, BiasedRRTConnect, Evaluation, evaluate
@@ -32,12 +33,6 @@ KINDS = ("plan", "plan, cut", "executed", "both", "both, cut")
 TRAINING_SEED, TEST_SEED, PROBLEM_SEED = 0, 1, 2
 TRAINING_SCENES, TEST_SCENES = range(20), range(100, 120)
 K, ITERATIONS = 10.0, 5000
-
-
-class ReachingArm(PlanarArm):
-    """The arm with the paper's problems, whose goals it can hold."""
-
-    sample_problem = PlanarArm.sample_reaching_problem
 
 
 class Setting(NamedTuple):

@@ -25,9 +25,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.shared_steps import kind_of_planner
 from examples.own_systems.suspended_load import SuspendedLoad
 from examples.own_systems.tractor_trailer import TractorTrailer
-from planners import BiasedRRT, BiasedRRTConnect, Evaluation, SuccessCalibration, evaluate
+from planners import Evaluation, SuccessCalibration, evaluate
 from reliability import (
     FastHistGradientBoostingClassifier,
     LearningResult,
@@ -74,8 +75,7 @@ class Experiment:
 
     def planner(self, estimator: Any = None, **parameters: Any) -> Any:
         """Return the planner for a system of this kind."""
-        extended = self.system.reduced_dim > self.system.configuration_dim
-        kind = BiasedRRT if extended else BiasedRRTConnect
+        kind = kind_of_planner(self.system)
         return kind(self.system, estimator, max_iterations=ITERATIONS, **parameters)
 
     def road_of_0_1(self) -> Any:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from benchmarks import acceptance
+from benchmarks.calibration_error import calibration_error
 from benchmarks.plan_worth import measured_systems, peg
 from benchmarks.plan_worth.__main__ import main
-from benchmarks.plan_worth.measures import calibration_error, error_of_the_truth
+from benchmarks.plan_worth.measures import error_of_the_truth
 
 
 def test_the_calibration_error_is_the_mean_gap_of_ten_bins():

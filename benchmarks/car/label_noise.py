@@ -9,6 +9,7 @@ import numpy as np
 from sklearn.calibration import CalibratedClassifierCV
 from sklearn.frozen import FrozenEstimator
 
+from benchmarks.calibration_error import N_BINS, bin_of, calibration_error
 from benchmarks.car.compared_planners import careful_planner
 from systems import Car, CarScene, random_car_scene
 
@@ -17,7 +18,6 @@ MOST_MOTION_SCENES, PLANS_PER_SCENE = 20, 10
 POSES_PER_SCENE, N_SPEEDS = 10, 64
 MOST_CALIBRATION_SCENES = 60
 LENGTH = 0.75
-N_BINS = 10
 
 
 @dataclass(frozen=True)
@@ -128,17 +128,11 @@ def _grid(
 
 def bins(probability: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Return mean probability, mean share and count of transitions by probability, (10, 3)."""
-    number = np.minimum((probability * N_BINS).astype(int), N_BINS - 1)
+    number = bin_of(probability)
     count = np.bincount(number, minlength=N_BINS)
     sums = [np.bincount(number, values, N_BINS) for values in (probability, share)]
     safe = np.maximum(count, 1)
     return np.column_stack([sums[0] / safe, sums[1] / safe, count])
-
-
-def calibration_error(probability: np.ndarray, share: np.ndarray) -> float:
-    """Return the mean distance between probability and share over the bins."""
-    rows = bins(probability, share)
-    return float(np.average(np.abs(rows[:, 0] - rows[:, 1]), weights=rows[:, 2]))
 
 
 def print_noise(noise: Noise, p_acc: float) -> None:

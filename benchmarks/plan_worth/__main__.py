@@ -18,16 +18,10 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from benchmarks.calibration_error import N_BINS, bin_of, calibration_error
 from benchmarks.plan_worth.executed_plans import Outcome, executed_plans
 from benchmarks.plan_worth.measured_systems import SYSTEMS
-from benchmarks.plan_worth.measures import (
-    HEAD,
-    N_BINS,
-    Worth,
-    bin_of,
-    calibration_error,
-    split,
-)
+from benchmarks.plan_worth.measures import HEAD, Worth, split
 from planners import Share, SuccessCalibration
 
 # Plans less likely to go well are made again.

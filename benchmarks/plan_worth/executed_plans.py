@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.plan_worth.measured_systems import SYSTEMS
+from benchmarks.shared_steps import succeeds
 from planners import PlanResult
 from reliability import Item, Job, ResumableStore, describe, run_jobs
-from systems import SimulationDivergedError
 
 PROBLEM_SEED = 16
 # Scenes of these numbers are not those that training data come from.
@@ -51,13 +51,7 @@ class ExecutedPlan:
         planner = copy.copy(self.planner).set_params(system=system, random_state=self.number)
         plan = planner.plan(system.reduce(problem.start), problem.goal)
         plan.save(self.plan_file)
-        succeeded = False
-        if plan.solved:
-            try:
-                final = system.rollout(problem.start, plan.commands).states[-1]
-                succeeded = bool(system.succeeded(final, problem.goal, measured.tolerance))
-            except SimulationDivergedError:
-                pass
+        succeeded = plan.solved and succeeds(system, problem, plan.commands, measured.tolerance)
         return Item({"succeeded": succeeded})
 
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
 
 from benchmarks.rope.table1 import COLUMNS
+from benchmarks.shared_steps import learned_classifier
 from examples.own_systems.suspended_load import SuspendedLoad
 from examples.own_systems.tractor_trailer import TractorTrailer
 from planners import BiasedRRT, BiasedRRTConnect
-from reliability import TransitionReliabilityClassifier, collect_transitions, load_estimator
+from reliability import load_estimator
 from systems import Car, PlanarArm, Problem, Rope, System, random_car_scene, random_rope_scene
 
 # ``make car`` trains it. After one round without a classifier no plan is found for the car.
@@ -58,22 +58,15 @@ class MeasuredSystem:
         """Train on executed plans, or read what was trained before."""
         if isinstance(self.learned_from, Path):
             return load_estimator(self.learned_from)
-        file = folder / "classifier.joblib"
-        if not file.exists():
-            data = collect_transitions(
-                self.scenes,
-                self.planner,
-                self.learned_from,
-                labels="executed",
-                n_jobs=n_jobs,
-                random_state=TRAINING_SEED,
-                path=folder / "transitions",
-                verbose=1,
-            )
-            classifier = TransitionReliabilityClassifier(random_state=0)
-            classifier.fit(data.features(self.scenes), data.y, groups=data.plan)
-            joblib.dump(classifier, file)
-        return load_estimator(file)
+        return learned_classifier(
+            folder / "classifier.joblib",
+            self.scenes,
+            self.planner,
+            self.learned_from,
+            data_seed=TRAINING_SEED,
+            classifier_seed=0,
+            n_jobs=n_jobs,
+        )
 
 
 def _car(seed: int) -> System:

@@ -9,29 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from sklearn.metrics import roc_auc_score
 
+from benchmarks.calibration_error import calibration_error
 from benchmarks.plan_worth.executed_plans import Outcome
 from planners import Share, SuccessCalibration
 
-N_BINS = 10
 N_SIMULATIONS = 1000
 # Shares of accepted plans that are to succeed.
 PROMISES = (0.8, 0.9)
-
-
-def calibration_error(probability: np.ndarray, succeeded: np.ndarray) -> float:
-    """Return the expected calibration error, with ten bins of equal width.
-
-    In each bin the mean probability is compared with the share of successes; the gaps are averaged,
-    weighted by the numbers of plans.
-    """
-    bins = bin_of(probability)
-    gaps = np.bincount(bins, succeeded - probability, minlength=N_BINS)
-    return float(np.abs(gaps).sum() / len(succeeded))
-
-
-def bin_of(probability: np.ndarray) -> np.ndarray:
-    """Return the number of the bin that each probability falls into."""
-    return np.minimum((N_BINS * probability).astype(int), N_BINS - 1)
 
 
 def error_of_the_truth(probability: np.ndarray) -> np.ndarray:
