@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dis
 import functools
 import hashlib
 import sys
@@ -17,6 +18,8 @@ from reliability.pickled_content import content_digest
 
 _LIBRARY = frozenset({"planners", "reliability", "systems"})
 _INSTALLED = frozenset({"site-packages", "dist-packages"})
+# What the body of a class notes down of its text.
+_NOTES = frozenset({"__doc__", "__firstlineno__"})
 _PLAIN = (bool, int, float, complex, str, bytes, np.generic, np.ndarray, tuple, frozenset, Enum)
 
 
@@ -119,7 +122,9 @@ class _Walk:
             self.tokens.add(f"def {function.__qualname__} {_fingerprint(code)}")
         defaults = (function.__defaults__, tuple((function.__kwdefaults__ or {}).items()))
         self.visit(f"{function.__qualname__} defaults", defaults)
-        names = {name for code in codes for name in code.co_names}
+        # The body of a class inside a function names its module's __name__ and, if it has a
+        # docstring, __doc__.
+        names = {name for code in codes for name in code.co_names if not name.startswith("__")}
         for name in sorted(names & function.__globals__.keys()):
             value = function.__globals__[name]
             if isinstance(value, types.ModuleType):
@@ -156,16 +161,36 @@ def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
             yield from _codes(constant)
 
 
+@functools.cache
 def _fingerprint(code: types.CodeType) -> str:
-    constants = [value for value in code.co_consts if not isinstance(value, types.CodeType)]
-    if constants and isinstance(constants[0], str) and not code.co_name.startswith("<"):
-        del constants[0]  # the docstring
-    parts = (code.co_code, _in_order(constants), code.co_names, code.co_varnames, code.co_freevars)
+    """Digest instructions, each with the constant or name that it uses.
+
+    No instruction uses a function's docstring, but it takes a place among the constants, so that
+    their places say nothing.
+    """
+    parts = (_instructions(code), code.co_varnames, code.co_exceptiontable)
     return hashlib.blake2b(repr(parts).encode(), digest_size=8).hexdigest()
+
+
+def _instructions(code: types.CodeType) -> list[tuple[str, Any]]:
+    found: list[tuple[str, Any]] = []
+    for instruction in dis.get_instructions(code):
+        if instruction.opcode == dis.EXTENDED_ARG:
+            continue
+        # Where a jump leads is counted from the beginning, its argument from where it stands.
+        is_jump = instruction.opcode in dis.hasjrel
+        argument = instruction.arg if is_jump else _in_order(instruction.argval)
+        if instruction.opname == "STORE_NAME" and argument in _NOTES:
+            found.pop()
+        else:
+            found.append((instruction.opname, argument))
+    return found
 
 
 def _in_order(constant: Any) -> Any:
     """Return a constant of compiled code with its sets sorted, whose order is random."""
+    if isinstance(constant, types.CodeType):  # which has a fingerprint of its own
+        return constant.co_name
     if isinstance(constant, frozenset):
         return sorted(map(repr, constant))
     return (

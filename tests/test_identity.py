@@ -203,17 +203,46 @@ class Mine(Disc):
         return [pull(c) + helpers_of_mine.friction(c) + LIMITS["low"][0] for c in commands]
     def close(self, predicted, executed):
         return {x in {"a", "b", "c"} for x in predicted}
+    def reduce(self, state):
+        class Reader:
+            """Reads."""
+            last = 1
+            def read(self):
+                """Read the end."""
+                return state[-self.last:]
+        return Reader().read()
+    def features(self, reduced, next_reduced):
+        return not self.steer(reduced, "fast")
 
 if __name__ == "__main__":
     n_plans = 120
 '''
-HELPERS = """
+HELPERS = '''
 MU = 0.3
+class Surface:
+    """What the wheels are on."""
+    def __init__(self, name):
+        self.name = name
+    @property
+    def slip(self):
+        """Nothing."""
+        return 0.5
+    def grip(self):
+        """Hold."""
+        try:
+            found = float(self.slip)
+        except ValueError:
+            found = 0.0
+        return found
+SURFACE = Surface("wet")
 def friction(c):
-    return (lambda v: -MU * v)(c)
+    """Brake."""
+    if c is None:
+        return None
+    return (lambda v: -MU * v)(c) + SURFACE.grip()
 def never_used():
     return 1
-"""
+'''
 
 
 @pytest.fixture
@@ -252,6 +281,13 @@ def digest_of(tmp_path, monkeypatch):
         ("(Disc)", "(Disc, object)"),
         ("def close", "def near"),
         ('{"a", "b", "c"}', '{"a", "b", "d"}'),
+        ("last = 1", "last = 2"),
+        ("state[-self", "state[self"),
+        ('"fast"', '"slow"'),
+        ('Surface("wet")', 'Surface("dry")'),
+        ("return 0.5", "return 0.4"),
+        ("found = 0.0", "found = 0.1"),
+        ("ValueError", "TypeError"),
     ],
 )
 def test_changed_physics_are_other_code(digest_of, change):
@@ -262,11 +298,27 @@ def test_changed_physics_are_other_code(digest_of, change):
     "change",
     [
         ("unused = 1", "unused = 2"),
+        ("A system of a user's own.", "A system of mine."),
         ("n_plans = 120", "n_plans = 240"),
         ('"""Falls."""', '"""Falls freely."""'),
         ('"""Fall."""', '"""Fall freely."""  # by gravity'),
         ("    return 1\n", "    return 2\n"),
         ("GRAVITY = 9.81", "GRAVITY = 9.810  # m/s²"),
+        ("        return [pull", "\n\n        # Friction too.\n        return [pull"),
+        ('    """Falls."""\n', ""),
+        ('        """Fall."""\n', ""),
+        ('"""Fall."""', '"""Fall.\n\n        Raises\n        ------\n        OSError\n        """'),
+        ("def pull(x):\n", 'def pull(x):\n    """Pull down."""\n'),
+        ("        return {x", '        "a"\n        return {x'),
+        ('"""Reads."""', '"""Reads on."""'),
+        ('            """Reads."""\n', ""),
+        ('"""Read the end."""', '"""Read."""'),
+        ('                """Read the end."""\n', ""),
+        ('    """Brake."""\n', ""),
+        ('    """What the wheels are on."""\n', ""),
+        ('        """Nothing."""\n', ""),
+        ('        """Hold."""\n', '        """Hold on."""\n'),
+        ('        """Hold."""\n', ""),
     ],
 )
 def test_what_the_class_does_not_reach_is_no_other_code(digest_of, change):
