@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from systems.angles import wrap_angle
 from systems.compilation import compiled
-from systems.validation import as_numbers, is_number
+from systems.validation import as_numbers, is_finite, is_number
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ def split_edges(
             f"starts and ends must have one shape, (n_edges, d), got {begins.shape} and "
             f"{stops.shape}."
         )
-    if not (np.isfinite(begins).all() and np.isfinite(stops).all()):
+    if not (is_finite(begins) and is_finite(stops)):
         raise ValueError("starts and ends must be finite, got NaN or infinity.")
     if not is_number(step_size) or not 0 < step_size < np.inf:
         raise ValueError(f"step_size must be a positive number, got {step_size!r}.")
