@@ -105,28 +105,40 @@ def motion_in_body_frame(poses: ArrayLike, next_poses: ArrayLike) -> Array:
     >>> motion_in_body_frame([[0.0, 0.0, np.pi]], [[-1.0, 0.0, -np.pi]]).round(3) + 0.0
     array([[1., 0., 0., 1.]])
     """
-    position, turned = _frames(poses)
-    before = np.asarray(poses, dtype=np.float64)
+    before = _as_poses(poses)
     after = as_finite_array(next_poses, "next_poses", before.shape)
-    moved = ((after[:, : position.shape[1]] - position)[:, None] @ turned)[:, 0]
     if before.shape[1] == PLANAR:
-        return np.hstack([moved, directions(after[:, 2:] - before[:, 2:])])
-    return np.hstack([moved, (_rotations(before).inv() * _rotations(after)).as_rotvec()])
+        d, turned = 2, _planar_matrices(before)
+        turn = directions(after[:, 2:] - before[:, 2:])
+    else:
+        rotations = _rotations(before)
+        d, turned = 3, rotations.as_matrix()
+        turn = (rotations.inv() * _rotations(after)).as_rotvec()
+    moved = ((after[:, :d] - before[:, :d])[:, None] @ turned)[:, 0]
+    return np.hstack([moved, turn])
 
 
-def _frames(poses: ArrayLike) -> tuple[Array, Array]:
-    """Return the positions, (n, d), and the matrices, (n, d, d), that turn body into world."""
+def _as_poses(poses: ArrayLike) -> Array:
     rows = as_finite_array(poses, "poses", (None, None))
-    if rows.shape[1] == SPATIAL:
-        return rows[:, :3], _rotations(rows).as_matrix()
-    if rows.shape[1] != PLANAR:
+    if rows.shape[1] not in (PLANAR, SPATIAL):
         raise ValueError(
             "poses must have the shape (n, 3), x, y and heading, or (n, 7), x, y, z and a "
             f"quaternion, got {rows.shape}."
         )
-    sine, cosine = np.sin(rows[:, 2]), np.cos(rows[:, 2])
-    matrices = np.stack([cosine, -sine, sine, cosine], axis=1).reshape(-1, 2, 2)
-    return rows[:, :2], matrices
+    return rows
+
+
+def _frames(poses: ArrayLike) -> tuple[Array, Array]:
+    """Return the positions, (n, d), and the matrices, (n, d, d), that turn body into world."""
+    rows = _as_poses(poses)
+    if rows.shape[1] == PLANAR:
+        return rows[:, :2], _planar_matrices(rows)
+    return rows[:, :3], _rotations(rows).as_matrix()
+
+
+def _planar_matrices(poses: Array) -> Array:
+    sine, cosine = np.sin(poses[:, 2]), np.cos(poses[:, 2])
+    return np.stack([cosine, -sine, sine, cosine], axis=1).reshape(-1, 2, 2)
 
 
 def _rotations(poses: Array) -> Rotation:
