@@ -1,4 +1,5 @@
 from .acceptance import PermissiveAcceptanceWarning as PermissiveAcceptanceWarning
+from .carrying_out import execute as execute
 from .check_transition import CheckTransition as CheckTransition
 from .comparison import Comparison as Comparison
 from .edge_checker import EdgeChecker as EdgeChecker
@@ -6,7 +7,6 @@ from .edge_discretization import split_edges as split_edges
 from .evaluation import Evaluation as Evaluation
 from .execution import Execution as Execution
 from .execution import ExecutionStatus as ExecutionStatus
-from .execution import execute as execute
 from .planner_evaluation import evaluate as evaluate
 from .restarts import best_of_restarts as best_of_restarts
 from .result import PlanResult as PlanResult

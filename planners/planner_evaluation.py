@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from planners.carrying_out import check_max_replans, execute
 from planners.evaluation import Evaluation
-from planners.execution import Execution, check_max_replans, execute
+from planners.execution import Execution
 from planners.kept_plan import item_of, plan_of
 from reliability.identity import describe_planner
 from reliability.item_files import Item

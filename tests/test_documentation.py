@@ -34,7 +34,7 @@ PAGES = sorted((ROOT / "docs").glob("*.md"))
         "systems.features.directions",
         "systems.features.mujoco_obstacles",
         "systems.features.ray_distances",
-        "planners.execution",
+        "planners.carrying_out",
         "planners.planner_evaluation",
         "planners.rrt",
         "planners.rrt_connect",
