@@ -7,7 +7,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import KW_ONLY, dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,11 +25,12 @@ from planners.plan_turning import plan_turning
 from planners.planning_problem import PlanningProblem
 from planners.restarts import best_until_enough
 from planners.result import PlanResult, PlanStatus
+from planners.search import Found, Search
 from planners.shortcutting import shorten
 from planners.shortcutting_repropagated import RepropagatedShortcuts
 from planners.success_calibration import SuccessCalibration
 from systems.goal_region import GoalRegion
-from systems.system import Array, System
+from systems.system import System
 from systems.validation import (
     RandomState,
     as_seed,
@@ -43,41 +44,6 @@ from systems.validation import (
 
 # No restart has this number, so that none has these random numbers.
 _FOR_ROBUSTNESS = (2**32 - 1,)
-
-
-class Search(NamedTuple):
-    """Everything that a search needs.
-
-    Attributes
-    ----------
-    problem : PlanningProblem
-    check : CheckTransition
-    budget : Budget
-    rng : Generator
-    ompl_seed : int
-        Seed for OMPL's random numbers, positive.
-    """
-
-    problem: PlanningProblem
-    check: CheckTransition
-    budget: Budget
-    rng: np.random.Generator
-    ompl_seed: int
-
-
-class Found(NamedTuple):
-    """What a search found.
-
-    Attributes
-    ----------
-    path : Path or None
-        From a start to a goal; None if the budget was exhausted first.
-    tree : ndarray of shape (n_edges, 2, configuration_dim)
-        Configurations at the ends of all accepted edges, in the direction of execution.
-    """
-
-    path: Path | None
-    tree: Array
 
 
 @dataclass(eq=False, repr=False)

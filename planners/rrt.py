@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from planners.batch_rrt import BatchRRT
-from planners.biased_planner import BiasedPlanner, Found, Search
+from planners.biased_planner import BiasedPlanner
+from planners.search import Found, Search
 
 
 class BiasedRRT(BiasedPlanner):

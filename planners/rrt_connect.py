@@ -7,11 +7,12 @@ from dataclasses import KW_ONLY, dataclass
 import numpy as np
 
 from planners.batch_rrt_connect import BatchRRTConnect
-from planners.biased_planner import BiasedPlanner, Found, Search
+from planners.biased_planner import BiasedPlanner
 from planners.edge_checker import EdgeChecker
 from planners.edge_discretization import split_edges
 from planners.ompl_backend import ompl_can_search, ompl_rrt_connect
 from planners.path import Path
+from planners.search import Found, Search
 from systems.system import Array
 from systems.validation import check_count
 
