@@ -133,6 +133,15 @@ def test_messages_on_large_arrays_are_short():
     assert len(str(caught.value)) < 200
 
 
+def test_numbers_whose_squares_are_infinite_are_finite():
+    large = np.array([[1e300, -1e200]])
+    assert as_finite_array(large, "a", (None, 2)) is large
+    empty = np.empty((0, 2))
+    assert as_finite_array(empty, "a", (None, 2)) is empty
+    with pytest.raises(ValueError, match="a must be finite"):
+        as_finite_array(np.array([[1e300, -np.inf]]), "a", (None, 2))
+
+
 def test_rows_that_are_right_are_returned_as_they_are():
     good, none = np.zeros((2, 3)), np.zeros((0, 3))
     first, second = as_rows("poses", 3, first=good, second=none)
