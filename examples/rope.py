@@ -4,20 +4,17 @@ The planner sees a rubber band between the grippers, the rope pulled taut (orang
 over the hook; the true rope (green) sags below it. Red spheres are where the grippers should end.
 """
 
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 import numpy as np
 
 from planners import BiasedRRT
-from reliability import load_estimator
+from reliability import load_pretrained
 from systems import BAND_COLOR, ROPE_COLOR, Rope, SceneRenderer
 
 SCENE = "simple_hook"
 SEED = 1
-MODELS = Path(__file__).parents[1] / "benchmarks" / "rope" / "models"
 
-classifier = load_estimator(MODELS / "rope_ours.skops")
+classifier = load_pretrained("rope")
 # This classifier reads how far the obstacles are below the band, the space where the rope hangs.
 rope = Rope(SCENE, features=classifier.provenance_["features"])
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from planners.share import draw_share
+from systems.extras import needing
 
 
 class Comparison:
@@ -102,7 +103,8 @@ class Comparison:
         axis : matplotlib Axes
         """
         if axis is None:
-            import matplotlib.pyplot as plt
+            with needing("examples", "Comparison.plot"):
+                import matplotlib.pyplot as plt
 
             height = 1.2 + 0.4 * len(self.evaluations)
             _, axis = plt.subplots(figsize=(6.5, height), layout="constrained")

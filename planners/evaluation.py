@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from planners.comparison import Comparison
 from planners.execution import ExecutionStatus
 from planners.share import Share, draw_share
+from systems.extras import needing
 from systems.system import Array
 
 _N_BINS = 5
@@ -248,7 +249,8 @@ class Evaluation:
         axes : sequence of two matplotlib Axes
         """
         if axes is None:
-            import matplotlib.pyplot as plt
+            with needing("examples", "Evaluation.plot"):
+                import matplotlib.pyplot as plt
 
             _, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
         counts = Counter(status.name for status in self.status).most_common()

@@ -2,6 +2,8 @@
 
 import lazy_loader
 
+import _transition_reliability  # noqa: F401
+
 __version__ = "0.1.0"
 
 # Public names stand in __init__.pyi; each is imported when it is first used, because

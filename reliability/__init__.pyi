@@ -23,6 +23,7 @@ from .model_files import ModelFileError as ModelFileError
 from .persistence import load_estimator as load_estimator
 from .persistence import save_estimator as save_estimator
 from .plan_execution import PlanFailedError as PlanFailedError
+from .pretrained import load_pretrained as load_pretrained
 from .reachable_code import code_digest as code_digest
 from .round_report import RoundReport as RoundReport
 from .store import Job as Job

@@ -13,6 +13,7 @@ from sklearn.base import BaseEstimator
 from reliability.networks.hyperparameters import Hyperparameters, as_plain
 from reliability.networks.mlp_inference import MLPInference
 from reliability.networks.voxel_format import check_pooling, grid_shape
+from systems.extras import needing
 from systems.validation import check_count, check_flag
 
 if TYPE_CHECKING:
@@ -76,7 +77,8 @@ class Backend(BaseEstimator, ABC):
         weights : dict of ndarray
             As :meth:`weights` gives them.
         """
-        from reliability.networks.module_inference import ModuleInference
+        with needing("torch", "This network"):
+            from reliability.networks.module_inference import ModuleInference
 
         build = partial(self.module, n_features, packed)
         return ModuleInference(build, weights, self.rows_per_forward)

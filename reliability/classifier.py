@@ -28,6 +28,7 @@ from reliability.training_set import (
     thin,
     weigh_classes,
 )
+from systems.extras import needing
 from systems.validation import RandomState, as_generator
 
 if TYPE_CHECKING:
@@ -237,7 +238,8 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
             label for all rows.
         """
         # Importing torch takes a second, which making and loading a classifier need not pay.
-        from reliability.networks.batches import LabelledRows
+        with needing("torch", "TransitionReliabilityClassifier.fit"):
+            from reliability.networks.batches import LabelledRows
 
         backend = clone(as_backend(self.backend))
         hyperparameters = backend.defaults.overridden_by(self)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from reliability.calibration_curve import N_BINS
+from systems.extras import needing
 
 _SUSPICIOUS, _PLAIN = "tab:red", "tab:blue"
 
@@ -14,7 +15,8 @@ _SUSPICIOUS, _PLAIN = "tab:red", "tab:blue"
 def draw_diagnosis(diagnosis: Any, axes: Any = None) -> Any:
     """Draw a diagnosis; see :meth:`Diagnosis.plot`."""
     if axes is None:
-        import matplotlib.pyplot as plt
+        with needing("examples", "Diagnosis.plot"):
+            import matplotlib.pyplot as plt
 
         _, axes = plt.subplots(1, 3, figsize=(13, 3.8), layout="constrained")
     _draw_calibration(diagnosis, axes[0])

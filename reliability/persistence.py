@@ -11,6 +11,7 @@ import sklearn
 
 from reliability.model_checks import check_model
 from reliability.model_files import ModelFileError, read_model, write_model
+from systems.extras import needing
 from systems.validation import as_path
 
 SKOPS = ".skops"
@@ -87,9 +88,10 @@ def load_estimator(path: str | os.PathLike[str]) -> Any:
 
 def _load_skops(path: Path) -> Any:
     try:
-        estimator = read_model(path)
-        check_model(estimator)
-    except (ModelFileError, FileNotFoundError):
+        with needing("torch", f"The network in {path}"):
+            estimator = read_model(path)
+            check_model(estimator)
+    except (ModelFileError, FileNotFoundError, ModuleNotFoundError):
         raise
     except Exception as error:
         raise ModelFileError(

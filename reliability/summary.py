@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from reliability.advice import label_warnings
 from reliability.labels import UNRELIABLE
 from reliability.transitions import Transitions
+from systems.extras import needing
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +125,8 @@ class Summary:
         axes : sequence of two matplotlib Axes
         """
         if axes is None:
-            import matplotlib.pyplot as plt
+            with needing("examples", "Summary.plot"):
+                import matplotlib.pyplot as plt
 
             _, axes = plt.subplots(1, 2, figsize=(9, 3), layout="constrained", sharey=True)
         most = int(self.transitions_per_plan.max())

@@ -1,8 +1,8 @@
 """Plan for the rope in one scene without and with a classifier, execute, and look at it.
 
 Run ``python -m benchmarks.rope complex_hook``. It plans from the scene's start, without a
-classifier until a rope gets caught, and with the trained model that lies beside this file from
-the same seeds; it prints what became of the plans and writes pictures and an animation of the
+classifier until a rope gets caught, and with the trained model that comes with the library
+from the same seeds; it prints what became of the plans and writes pictures and an animation of the
 caught rope beside the other one to ``--out``. The rope is green; the band, which is what the
 planner believed, is orange. ``--train`` makes the models anew first, which takes hours.
 """
@@ -19,6 +19,7 @@ import matplotlib.image
 import numpy as np
 from PIL import Image
 
+import reliability
 from planners import BiasedRRT
 from reliability import load_estimator
 from systems import (
@@ -32,7 +33,7 @@ from systems import (
     load_scene,
 )
 
-MODELS = Path(__file__).parent / "models"
+MODELS = Path(reliability.__file__).with_name("pretrained")
 K = 10.0
 TIME_LIMIT = 60.0
 TOLERANCE = 0.025
@@ -53,7 +54,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Plan, execute and draw."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scene", nargs="?", default="simple_hook", choices=SCENE_NAMES)
-    parser.add_argument("--model", type=Path, default=MODELS / "rope_ours.skops")
+    parser.add_argument("--model", type=Path, default=MODELS / "rope.skops")
     parser.add_argument("--features", default="voxels", help="of a model that doesn't say")
     parser.add_argument("--engine", choices=("mujoco", "pybullet"), default="mujoco")
     parser.add_argument("--plans", type=int, default=10, help="seeds to try at most")

@@ -5,7 +5,7 @@ has a seed of its own, the same in all columns. It is a success if its plan is f
 limit and its execution ends within 0.025 m of the goal. Each finished trial is a file in
 ``--out``, in a folder per column: a run that was interrupted goes on where it stopped, and one with
 another planner is refused there. Columns are ``none`` and ``pbd``,
-without a classifier and without or with PBD ropes, models that come with the examples
+without a classifier and without or with PBD ropes, models that come with the library
 (``paper``, ``ours``, ``vector``), or the file of any fitted estimator of the rope's features.
 """
 
@@ -19,18 +19,19 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
+import reliability
 from benchmarks.rope.table1_trials import Column, Trial
 from reliability import Job, run_jobs
 from systems import SCENE_NAMES
 
-MODELS = Path(__file__).with_name("models")
+MODELS = Path(reliability.__file__).with_name("pretrained")
 # Features of ropes without a classifier: nothing reads them, but with "clearance" a rope carries
 # PBD ropes.
 UNCLASSIFIED = {"none": "voxels", "pbd": "clearance"}
 COLUMNS = {
     **dict.fromkeys(UNCLASSIFIED),
     "paper": MODELS / "rope_paper.skops",
-    "ours": MODELS / "rope_ours.skops",
+    "ours": MODELS / "rope.skops",
     "vector": MODELS / "rope_vector.skops",
 }
 # Successes of 30, planning and smoothing seconds, without a classifier and with VoxNet.

@@ -54,14 +54,14 @@ def train_all(folder: Path, models: Path, n_plans: int, n_jobs: int) -> None:
     n_plans : int
         In Simple Hook for the paper's models, and in each round for ours.
     models : Path
-        For ``rope_paper.skops``, ``rope_vector.skops`` and ``rope_ours.skops``.
+        For ``rope_paper.skops``, ``rope_vector.skops`` and ``rope.skops``, which is ours.
     n_jobs : int
         Processes that collect.
     """
     models.mkdir(parents=True, exist_ok=True)
     simple_hook = of_bands(collect_simple_hook(folder, n_plans, n_jobs))
     save_estimator(train_vector(simple_hook), models / "rope_vector.skops")
-    save_estimator(train_ours(folder, n_plans, n_jobs), models / "rope_ours.skops")
+    save_estimator(train_ours(folder, n_plans, n_jobs), models / "rope.skops")
     paper = train_paper(simple_hook, folder / "voxnet.checkpoint")
     save_estimator(paper, models / "rope_paper.skops")
 

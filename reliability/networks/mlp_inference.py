@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.compilation import compiled
+from systems.extras import needing
 
 # From so many rows on, the tensor library is faster in spite of its import.
 ROWS_FOR_TORCH = 2048
@@ -104,7 +105,8 @@ class MLPInference:
     @cached_property
     def _in_torch(self) -> Any:
         # Importing torch takes seconds, which small batches need not pay.
-        from reliability.networks.module_inference import ModuleInference
+        with needing("torch", "This network"):
+            from reliability.networks.module_inference import ModuleInference
 
         return ModuleInference(self.build, self.weights, self.rows_per_forward)
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from systems.extras import needing
 from systems.rope.obstacles.shapes import Array, Box, Cylinder, Obstacle
 from systems.rope.scene import ROPE_RADIUS
 from systems.rope.simulation.state import RopeState
@@ -236,13 +237,8 @@ def _disconnect(bullet: ModuleType, client: int, mark: tuple[int, str]) -> None:
 
 
 def _import_pybullet() -> ModuleType:
-    try:
+    with needing("pybullet", 'Rope(engine="pybullet")'):
         import pybullet
-    except ImportError as error:
-        raise ImportError(
-            "The engine 'pybullet' needs PyBullet: install transition-reliability[pybullet], or "
-            "use the engine 'mujoco'."
-        ) from error
     return pybullet
 
 
