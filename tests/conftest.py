@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -12,6 +13,32 @@ from toy_systems import Disc
 from planners import BiasedRRTConnect
 from reliability import TransitionReliabilityClassifier, collect_transitions
 from systems import PlanarArm
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup():
+    with skipping_without_extras():
+        return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call():
+    with skipping_without_extras():
+        return (yield)
+
+
+@contextmanager
+def skipping_without_extras():
+    """Skip a test that comes upon an extra which is not installed, such as torch."""
+    try:
+        yield
+    except Exception as error:
+        cause = error
+        while cause is not None:
+            if isinstance(cause, ModuleNotFoundError) and "pip install" in str(cause):
+                pytest.skip(str(cause))
+            cause = cause.__cause__
+        raise
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -1,6 +1,8 @@
 """Torch modules whose answers show how they were trained."""
 
-import torch
+import pytest
+
+torch = pytest.importorskip("torch", reason="needs the extra [torch]")
 
 
 class Own(torch.nn.Module):

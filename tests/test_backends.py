@@ -4,7 +4,9 @@ import pickle
 
 import numpy as np
 import pytest
-import torch
+
+torch = pytest.importorskip("torch", reason="needs the extra [torch]")
+
 from own_modules import TwoLayers
 from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV, RandomizedSearchCV
