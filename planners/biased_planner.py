@@ -23,6 +23,7 @@ from planners.path import Path
 from planners.plan_robustness import plan_robustness
 from planners.plan_turning import plan_turning
 from planners.planning_problem import PlanningProblem
+from planners.progress import Progress
 from planners.restarts import best_until_enough
 from planners.result import PlanResult, PlanStatus
 from planners.search import Found, Search
@@ -38,6 +39,7 @@ from systems.validation import (
     check_count,
     check_flag,
     check_number,
+    check_verbose,
     is_integer,
     is_number,
 )
@@ -66,6 +68,7 @@ class BiasedPlanner(BaseEstimator):
     min_success: float = 0.0
     restarts: int = 0
     random_state: RandomState = None
+    verbose: int = 0
 
     @abstractmethod
     def _search(self, search: Search) -> Found:
@@ -156,16 +159,21 @@ class BiasedPlanner(BaseEstimator):
         terminated: Callable[[], bool],
     ) -> PlanResult:
         began = time.perf_counter()
-        budget = Budget(int(self.max_iterations), time_limit, terminated)
+        progress = Progress(type(self).__name__, bool(self.verbose))
+        budget = Budget(int(self.max_iterations), time_limit, terminated, progress.advance)
         search = self._build(seed, starts, goal, budget)
         with _one_thread(search.check):
-            found = self._search(search)
+            with progress.searching(search.check, int(self.max_iterations)):
+                found = self._search(search)
             searched = time.perf_counter()
+            progress.searched(found.path, search.check, searched - began)
             path = self._shortened(found, search)
             robustness = self._robustness(path, seed)
         times = searched - began, time.perf_counter() - searched
         report = self._report(search, found, path, times, seed)
-        return self._calibrated(replace(report, robustness=robustness))
+        plan = self._calibrated(replace(report, robustness=robustness))
+        progress.planned(plan)
+        return plan
 
     def _robustness(self, path: Path | None, seed: int) -> float | None:
         if path is None or self.estimator is None:
@@ -224,6 +232,7 @@ class BiasedPlanner(BaseEstimator):
             raise ValueError(f"time_limit must be None or positive seconds, got {limit!r}.")
         if not is_integer(self.restarts) or self.restarts < 0:
             raise ValueError(f"restarts must be 0 or a positive integer, got {self.restarts!r}.")
+        check_verbose(self.verbose)
         self._check_trust()
 
     def _check_trust(self) -> None:

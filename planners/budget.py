@@ -27,6 +27,8 @@ class Budget:
     terminated : callable, default=never
         Asked before each round of the search; it stops when the answer is True. OMPL's
         termination conditions are such callables.
+    advanced : callable, default=None
+        Told the number of iterations each time that some are used.
 
     Attributes
     ----------
@@ -39,10 +41,12 @@ class Budget:
         max_iterations: int,
         time_limit: float | None = None,
         terminated: Callable[[], bool] = never,
+        advanced: Callable[[int], None] | None = None,
     ) -> None:
         self._left = max_iterations
         self._deadline = np.inf if time_limit is None else time.perf_counter() + time_limit
         self._terminated = terminated
+        self._advanced = advanced
         self.limit = PlanStatus.ITERATION_LIMIT
 
     def exhausted(self, n_iterations: int = 1) -> bool:
@@ -55,5 +59,7 @@ class Budget:
             self.limit = PlanStatus.TERMINATED
         else:
             self._left -= n_iterations
+            if self._advanced is not None:
+                self._advanced(n_iterations)
             return False
         return True

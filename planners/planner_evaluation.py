@@ -19,6 +19,7 @@ from reliability.item_files import Item
 from reliability.plan_execution import PlanFailedError, causes_restored
 from reliability.scenes import SceneArgument, SceneFamily, plan_seeds
 from reliability.store import Job, ResumableStore, run_jobs
+from systems.messages import tell
 from systems.system import System
 from systems.validation import RandomState, as_seed, check_count, check_number
 
@@ -69,7 +70,7 @@ def evaluate(
         Folder in which each problem's outcome is kept as soon as it is known. Call again with the
         same arguments to go on after an interruption, or with a larger ``n_problems``.
     verbose : int, default=0
-        1 shows a progress bar, and prints the table.
+        1 shows a progress bar, and tells the table.
 
     Returns
     -------
@@ -129,7 +130,7 @@ def evaluate(
     ]
     evaluation = Evaluation.of(outcomes, float(tolerance), int(max_replans), seed)
     if verbose:
-        print(evaluation)
+        tell(str(evaluation))
     return evaluation
 
 

@@ -75,6 +75,8 @@ class BiasedRRTConnect(BiasedPlanner):
         with a plan of at least ``min_success``, or of 1 where ``min_success`` is 0: then all
         restarts are made, and the likeliest plan is carried out, however unlikely it is.
     random_state : int, Generator, RandomState, SeedSequence or None, default=None
+    verbose : int, default=0
+        1 shows a progress bar during the search, and tells what it found and what became of it.
 
     References
     ----------

@@ -24,6 +24,7 @@ from reliability.scenes import SceneArgument, SceneFamily
 from reliability.store import Job, ResumableStore, run_jobs
 from reliability.summary import Summary
 from reliability.transitions import Transitions, join
+from systems.messages import tell
 from systems.validation import RandomState, as_seed, check_choice, check_count
 
 _KIND = "transitions of executed plans, one plan in each file"
@@ -77,7 +78,7 @@ def collect_transitions(
         with a smaller one, only its first plans are read. Several processes may work on one
         folder.
     verbose : int, default=0
-        1 shows a progress bar that counts plans, and prints a
+        1 shows a progress bar that counts plans, and tells a
         :class:`reliability.summary.Summary`, which can also be drawn, and the first of its
         ``warnings``, if there are any.
 
@@ -233,7 +234,7 @@ def joined(items: list[Item], verbose: int) -> Transitions:
     transitions = join(parts)
     if verbose:
         summary = Summary.of(transitions)
-        print(f"{summary}\nOf {len(items):,} plans {counts}")
+        tell(f"{summary}\nOf {len(items):,} plans {counts}")
         for warning in summary.warnings[:1]:
-            print(f"Warning: {warning}")
+            tell(f"Warning: {warning}")
     return transitions

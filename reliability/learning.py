@@ -15,6 +15,7 @@ from reliability.plan_execution import Planner
 from reliability.round_report import RoundReport
 from reliability.scenes import SceneArgument
 from reliability.transitions import Transitions, join
+from systems.messages import tell
 from systems.validation import RandomState, check_count
 
 
@@ -151,7 +152,7 @@ def learn_in_rounds(
         Problems, scenes and seeds differ between rounds, from those of validation, and from those
         that :func:`collect_transitions` draws from the same ``random_state``.
     verbose : int, default=0
-        1 shows progress, and prints a report after each round.
+        1 shows progress, and tells a report after each round.
 
     Returns
     -------
@@ -187,10 +188,10 @@ def learn_in_rounds(
     while len(rounds) < n_rounds and not (rounds and rounds[-1].report.brought_nothing):
         rounds.append(recipe.next_round(rounds, folder))
         if verbose:
-            print(rounds[-1].report)
+            tell(str(rounds[-1].report))
     result = _result(rounds, n_rounds)
     if verbose:
-        print(result.conclusion)
+        tell(result.conclusion)
     return result
 
 

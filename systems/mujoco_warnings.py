@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import logging
-
-_LOGGER = logging.getLogger("transition-reliability")
+from systems.messages import LOGGER
 
 
 def log_warnings() -> None:
@@ -21,4 +19,4 @@ def log_warnings() -> None:
 
 def _log(text: str | bytes) -> None:
     words = text.decode(errors="replace") if isinstance(text, bytes) else text
-    _LOGGER.info("MuJoCo: %s", words)
+    LOGGER.info("MuJoCo: %s", words)

@@ -111,6 +111,14 @@ def check_choice(value: Any, name: str, choices: Iterable[str]) -> None:
         raise ValueError(f"{name} must be one of {', '.join(choices)}, got {value!r}.")
 
 
+def check_verbose(value: Any) -> None:
+    """Raise ``ValueError`` unless ``verbose`` is a number of 0 or more, or True or False."""
+    if isinstance(value, bool | np.bool_):
+        return
+    if not is_integer(value) or value < 0:
+        raise ValueError(f"verbose must be 0 or a positive integer, got {value!r}.")
+
+
 def check_flag(value: Any, name: str) -> None:
     """Raise ``ValueError`` unless a value is True or False."""
     if not isinstance(value, bool | np.bool_):

@@ -128,7 +128,7 @@ def collected(capsys, **parameters):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         collect_transitions(Disc(**parameters), planner, 80, random_state=0, verbose=1)
-    return [line for line in capsys.readouterr().out.splitlines() if "Warning" in line]
+    return [line for line in capsys.readouterr().err.splitlines() if "Warning" in line]
 
 
 def test_collection_shows_the_first_warning_and_only_one(capsys):

@@ -400,8 +400,8 @@ def test_progress_and_summary_on_request(capsys):
     output = capsys.readouterr()
     assert "0/5" in output.err
     assert "5/5" in output.err
-    assert "transitions of 5 plans" in output.out
-    assert "Of 5 plans 0 were not solved, 0 diverged, 0 failed." in output.out
+    assert "transitions of 5 plans" in output.err
+    assert "Of 5 plans 0 were not solved, 0 diverged, 0 failed." in output.err
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         collect(Disc(), 5)

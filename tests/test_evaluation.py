@@ -346,9 +346,9 @@ def test_plots_show_counts_and_shares():
     pyplot.close("all")
 
 
-def test_verbose_prints_the_table(capsys):
+def test_verbose_tells_the_table(capsys):
     evaluation = assess(Point(), n_problems=3, verbose=1)
-    assert str(evaluation) in capsys.readouterr().out
+    assert str(evaluation) in capsys.readouterr().err
 
 
 def test_an_estimators_planner_is_evaluated_too(disc_data):

@@ -571,5 +571,5 @@ def test_a_damaged_round_is_named(whole, folder, tmp_path):
 def test_progress_is_told(whole, folder, capsys):
     learn(path=folder, verbose=1)
     printed = capsys.readouterr()
-    assert [f"Round {number}:" in printed.out for number in range(3)] == [True] * 3
+    assert [f"Round {number}:" in printed.err for number in range(3)] == [True] * 3
     assert "25/25" in printed.err
