@@ -58,9 +58,39 @@ class Backend(BaseEstimator, ABC):
     def module(self, n_features: int, packed: bool) -> Any:
         """Build a torch module, with random weights, that maps (n, n_features) rows to n logits."""
 
-    def module_for(self, training: LabelledRows) -> Any:
-        """Build a module, with random weights, to be trained on rows."""
-        return self.module(training.rows.shape[1], training.rows.dtype == np.uint8)
+    def module_for(
+        self, training: LabelledRows, weights: dict[str, NDArray[Any]] | None = None
+    ) -> Any:
+        """Build a module to be trained on rows.
+
+        Parameters
+        ----------
+        training : LabelledRows
+        weights : dict of ndarray, default=None
+            What to start from, as :meth:`weights` gives them; None takes random ones.
+        """
+        module = self.module(training.rows.shape[1], training.rows.dtype == np.uint8)
+        if weights is not None:
+            self.set_weights(module, weights)
+        return module
+
+    def set_weights(self, module: Any, weights: dict[str, NDArray[Any]]) -> None:
+        """Give a module the parameters and buffers that :meth:`weights` returned.
+
+        Raises
+        ------
+        ValueError
+            If they are those of another module.
+        """
+        from reliability.networks.module_inference import as_tensors
+
+        try:
+            module.load_state_dict(as_tensors(weights))
+        except RuntimeError as error:
+            raise ValueError(
+                "warm_start needs the backend of the last fit, with the same layers: set "
+                f"warm_start=False to begin anew ({error})."
+            ) from error
 
     def weights(self, module: Any) -> dict[str, NDArray[Any]]:
         """Return a trained module's parameters and buffers by name."""
@@ -131,10 +161,21 @@ class MLP(Backend):
 
         return MLPModule(n_features, as_plain(self.hidden_layer_sizes))
 
-    def module_for(self, training: LabelledRows) -> Any:
-        """Build the layers, with random weights, and standardize what comes in."""
-        module = super().module_for(training)
+    def module_for(
+        self, training: LabelledRows, weights: dict[str, NDArray[Any]] | None = None
+    ) -> Any:
+        """Build the layers, and standardize what comes in.
+
+        Parameters
+        ----------
+        training : LabelledRows
+        weights : dict of ndarray, default=None
+            What to start from, for features that are not standardized; None takes random ones.
+        """
+        module = super().module_for(training, weights)
         module.standardize(*training.middle_and_scale())
+        if weights is not None:
+            module.leave_out_scaling()
         return module
 
     def weights(self, module: Any) -> dict[str, NDArray[Any]]:

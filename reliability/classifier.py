@@ -29,7 +29,7 @@ from reliability.training_set import (
     weigh_classes,
 )
 from systems.extras import needing
-from systems.validation import RandomState, as_generator
+from systems.validation import RandomState, as_generator, check_flag
 
 if TYPE_CHECKING:
     from reliability.networks.batches import LabelledRows
@@ -94,6 +94,13 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         call it again with the same data and parameters: it goes on from the file, and ends with
         the same weights as if it had not been killed. Needs a ``random_state``. ``max_epochs`` may
         be larger than before.
+    warm_start : bool, default=False
+        Start a further ``fit`` from the weights that the last one ended with, instead of random
+        ones: to go on learning when more plans have been executed. The learning rate begins anew,
+        and ``history_`` is that of the last ``fit``. X must have the same features and y the same
+        labels as before, and the backend must be the same. Give the earlier plans along with the
+        new ones, as what is no longer shown is forgotten. Rows that are held out now may have been
+        trained on before, which makes what is measured on them too good.
     random_state : int, Generator, RandomState or None, default=None
         Makes the split and the training repeatable. Global random generators are neither used nor
         changed.
@@ -169,6 +176,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         balanced_batches: bool | None = None,
         device: str = "cpu",
         checkpoint: str | os.PathLike[str] | None = None,
+        warm_start: bool = False,
         random_state: RandomState = None,
         verbose: int = 0,
     ) -> None:
@@ -185,6 +193,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         self.balanced_batches = balanced_batches
         self.device = device
         self.checkpoint = checkpoint
+        self.warm_start = warm_start
         self.random_state = random_state
         self.verbose = verbose
 
@@ -244,10 +253,16 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         backend = clone(as_backend(self.backend))
         hyperparameters = backend.defaults.overridden_by(self)
         self._check_checkpoint()
-        rows, labels = validate_data(self, X, y, dtype=backend.row_types)
-        self._packed = rows.dtype == np.uint8
+        check_flag(self.warm_start, "warm_start")
+        goes_on = self.warm_start and self.__sklearn_is_fitted__()
+        rows, labels = validate_data(self, X, y, dtype=backend.row_types, reset=not goes_on)
+        classes, target = encode_labels(labels)
+        packed = rows.dtype == np.uint8
+        if goes_on:
+            self._check_same_kind(classes, packed)
+        self.classes_, self._packed = classes, packed
         backend.check(self.n_features_in_, self._packed)
-        self.classes_, target = encode_labels(labels)
+        weights = self._weights() if goes_on else None
         weight = check_sample_weight(sample_weight, len(rows))
         loss_weight = weight * weigh_classes(labels, self.classes_, self.class_weight)
         rng = as_generator(self.random_state)
@@ -255,7 +270,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         data = LabelledRows(rows, target, loss_weight, weight, np.arange(len(rows)))
         training, held_out = map(data.select, split)
         self._inference, self.history_ = self._train(
-            backend, hyperparameters, training, held_out, rng
+            backend, hyperparameters, training, held_out, rng, weights
         )
         validated = held_out.select(held_out.index[weight[held_out.index] > 0])
         logits = self._logits_of(validated).astype(np.float64)
@@ -373,7 +388,8 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
                 f"this version of transition-reliability reads format {FORMAT_VERSION}. Load it "
                 "with the version that saved it, or train it again."
             )
-        super().__setstate__(state)
+        # Files of before this parameter are good as they are.
+        super().__setstate__({"warm_start": False, **state})
 
     def _check_checkpoint(self) -> None:
         if self.checkpoint is None:
@@ -386,6 +402,24 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
                 "Pass an integer."
             )
 
+    def _weights(self) -> dict[str, NDArray[Any]] | None:
+        """Return the weights of the last fit; None if it saw one label only."""
+        return getattr(self._inference, "weights", None)
+
+    def _check_same_kind(self, classes: NDArray[Any], packed: bool) -> None:
+        """Raise ``ValueError`` unless the data are of the kind that the last ``fit`` had."""
+        if not np.array_equal(classes, self.classes_):
+            raise ValueError(
+                f"warm_start needs the labels of the last fit, {self.classes_.tolist()}, got "
+                f"{classes.tolist()}. Give the earlier plans along with the new ones."
+            )
+        if packed != self._packed:
+            raise ValueError(
+                "warm_start needs rows as in the last fit: "
+                f"{'packed grids of uint8' if self._packed else 'numbers'}, got "
+                f"{'packed grids of uint8' if packed else 'numbers'}."
+            )
+
     def _train(
         self,
         backend: Backend,
@@ -393,6 +427,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         training: LabelledRows,
         held_out: LabelledRows,
         rng: np.random.Generator,
+        weights: dict[str, NDArray[Any]] | None,
     ) -> tuple[Any, list[dict[str, float]]]:
         """Return what computes logits, and the history of the training."""
         training, held_out = training.weighted(), held_out.weighted()
@@ -416,9 +451,10 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
             device=self.device,
             checkpoint=self.checkpoint,
             verbose=self.verbose,
+            weights=weights,
         )
-        weights, history = train(task)
-        return backend.inference(self.n_features_in_, self._packed, weights), history
+        trained, history = train(task)
+        return backend.inference(self.n_features_in_, self._packed, trained), history
 
     def _logits_of(self, data: LabelledRows) -> NDArray[np.float32]:
         """Return the logit of each row, shape (n,)."""

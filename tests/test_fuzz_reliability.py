@@ -65,6 +65,7 @@ DATA = Transitions(**COLUMNS)
 X = np.random.default_rng(0).normal(size=(16, 3))
 Y = np.tile([0, 1], 8)
 PLANS = np.repeat(np.arange(8), 2)
+pytest.importorskip("torch", reason="needs the extra [torch]")
 CLASSIFIER = TransitionReliabilityClassifier(MLP((4,)), max_epochs=1, random_state=0).fit(X, Y)
 BOOSTING = FastHistGradientBoostingClassifier(max_iter=2, min_samples_leaf=2).fit(X, Y)
 MADE = DATA[[0, 1, 2, 3] * 4]

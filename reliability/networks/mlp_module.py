@@ -57,3 +57,11 @@ class MLPModule(nn.Module):
         first.weight.copy_(weight)
         self.middle.zero_()
         self.scale.fill_(1)
+
+    @torch.no_grad()
+    def leave_out_scaling(self) -> None:
+        """Let the first layer give for standardized features what it gave for others."""
+        first: Any = self.layers[0]
+        weight = first.weight.double()
+        first.bias.copy_(first.bias.double() + weight @ self.middle.double())
+        first.weight.copy_(weight * self.scale.double())

@@ -80,11 +80,16 @@ class ModuleInference:
 
     def _trained_module(self, device: str) -> nn.Module:
         module: Any = self.build()
-        module.load_state_dict({name: torch.from_numpy(w) for name, w in self.weights.items()})
+        module.load_state_dict(as_tensors(self.weights))
         module.eval().to(device if is_available(device) else "cpu")
         if hasattr(module, "for_inference"):
             module.for_inference()
         return module
+
+
+def as_tensors(weights: dict[str, NDArray[Any]]) -> dict[str, Tensor]:
+    """Return arrays as tensors that share their memory."""
+    return {name: torch.from_numpy(array) for name, array in weights.items()}
 
 
 def _as_tensor(rows: NDArray[Any]) -> Tensor:

@@ -35,6 +35,7 @@ class TrainingTask(NamedTuple):
     device: str
     checkpoint: str | os.PathLike[str] | None
     verbose: int
+    weights: dict[str, NDArray[Any]] | None = None  # to start from; None for random ones
 
 
 def train(task: TrainingTask) -> tuple[dict[str, NDArray[Any]], list[dict[str, float]]]:
@@ -80,7 +81,7 @@ def train(task: TrainingTask) -> tuple[dict[str, NDArray[Any]], list[dict[str, f
 def _network(task: TrainingTask, callbacks: list[tuple[str, Callback]]) -> NeuralNet:
     chosen = task.hyperparameters
     return NeuralNet(
-        partial(task.backend.module_for, task.training),
+        partial(task.backend.module_for, task.training, task.weights),
         criterion=WeightedLoss,
         optimizer=torch.optim.Adam,
         optimizer__fused=True,
@@ -151,10 +152,11 @@ def _identity(task: TrainingTask) -> dict[str, str]:
         "digest of the training rows": task.training.index,
         "digest of the held-out rows": task.held_out.index,
     }
+    start = {f"digest of {name} at the start": w for name, w in (task.weights or {}).items()}
     return (
         {name: repr(as_plain(value)) for name, value in values.items()}
         | task.training.digests()
-        | {name: digest(index) for name, index in selected.items()}
+        | {name: digest(array) for name, array in {**selected, **start}.items()}
     )
 
 
