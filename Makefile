@@ -1,4 +1,4 @@
-# Verbs: arm, rope, car, test, check, bench, env, clean.
+# Verbs: arm, rope, car, test, check, bench, env, clean; test-newest, test-sdist, test-matrix.
 PYTHON ?= python3.11
 ENV := .venv
 RUN := $(ENV)/bin/python
@@ -15,6 +15,28 @@ car: $(ENV)/ready ## no data to the car's tables and pictures, in build/car
 test: $(ENV)/ready check ## style, types and tests
 	$(RUN) -m pytest
 
+# With the newest dependencies, in an environment for each Python; EXTRAS=test leaves out torch.
+EXTRAS ?= all,test
+NEWEST := .venv-newest/$(notdir $(PYTHON))
+test-newest: ## such as make test-newest PYTHON=python3.13 EXTRAS=test
+	$(PYTHON) -m venv $(NEWEST)
+	$(NEWEST)/bin/python -m pip install --quiet --upgrade --editable ".[$(EXTRAS)]"
+	$(NEWEST)/bin/python -m pytest $(TESTS)
+
+# What is not in the source distribution is missed; TESTS=tests/test_packages.py runs a part.
+SDIST := build/sdist
+test-sdist: $(ENV)/ready ## from a source distribution, unpacked in an empty folder
+	$(RUN) -m pip install --quiet "build>=1.2"
+	rm -rf $(SDIST) && $(RUN) -m build --sdist --outdir $(SDIST) . > /dev/null
+	mkdir $(SDIST)/unpacked && tar -xzf $(SDIST)/*.tar.gz -C $(SDIST)/unpacked --strip-components 1
+	cd $(SDIST)/unpacked && PYTHONPATH=. $(abspath $(RUN)) -m pytest $(TESTS)
+
+# What CI runs, with each of these Pythons that is here.
+PYTHONS := $(shell for version in 3.11 3.12 3.13; do python$$version -c "" 2> /dev/null && echo python$$version; done)
+test-matrix: test test-lowest test-sdist ## every leg of .github/workflows/tests.yml
+	for python in $(PYTHONS); do $(MAKE) test-newest PYTHON=$$python || exit 1; done
+	$(MAKE) test-newest PYTHON=$(lastword $(PYTHONS)) NEWEST=.venv-newest/without-extras EXTRAS=test
+
 check: $(ENV)/ready
 	$(RUN) -m ruff check .
 	$(RUN) -m ruff format --check .
@@ -27,10 +49,10 @@ env: $(ENV)/ready
 
 $(ENV)/ready: setup.cfg pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(ENV)
-	$(RUN) -m pip install --quiet --constraint constraints.txt --editable ".[test,examples,pybullet]"
+	$(RUN) -m pip install --quiet --constraint constraints.txt --editable ".[all,test]"
 	touch $@
 
 clean:
-	rm -rf $(ENV) build *.egg-info
+	rm -rf $(ENV) .venv-newest build *.egg-info
 
-.PHONY: arm rope car test check bench env clean
+.PHONY: arm rope car test test-newest test-sdist test-matrix check bench env clean
