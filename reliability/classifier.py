@@ -16,6 +16,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from reliability.backends import Backend, as_backend
 from reliability.base_rate import warn_if_no_better_than_base_rate, weighted_share
 from reliability.calibration_curve import CalibrationCurve
+from reliability.fit_callbacks import CallbackSupportMixin, FitTasks
 from reliability.model_files import ModelFileError
 from reliability.networks.constant_inference import ConstantInference
 from reliability.networks.hyperparameters import Hyperparameters
@@ -39,7 +40,7 @@ STAMPED_PACKAGES = ("numpy", "scikit-learn", "skorch", "torch")
 _ROWS_AT_ONCE = 16384
 
 
-class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
+class TransitionReliabilityClassifier(CallbackSupportMixin, ClassifierMixin, BaseEstimator):
     """Predict whether a transition of the reduced model is reliable.
 
     A neural network that is trained on labelled transitions, with two classes. Part of the plans is
@@ -128,6 +129,10 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
 
     Notes
     -----
+    From scikit-learn 1.9 on, ``set_callbacks`` takes scikit-learn's callbacks, such as
+    ``sklearn.callback.ScoringMonitor``. They are told of ``fit`` and of each epoch, with an
+    estimator of the weights so far, not calibrated; one that answers True stops the training.
+
     After training, all logits are multiplied by one number, from 0.05 to 1, for which the
     probabilities fit the held-out rows best (temperature scaling). Labels do not depend on it.
     The held-out plans thus choose the epoch as well, which makes the attributes measured on them
@@ -269,15 +274,17 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         split = hold_out(len(rows), groups, hyperparameters.validation_fraction, rng)
         data = LabelledRows(rows, target, loss_weight, weight, np.arange(len(rows)))
         training, held_out = map(data.select, split)
-        self._inference, self.history_ = self._train(
-            backend, hyperparameters, training, held_out, rng, weights
-        )
         validated = held_out.select(held_out.index[weight[held_out.index] > 0])
-        logits = self._logits_of(validated).astype(np.float64)
-        self._check_finite(logits)
         is_second = validated.target[validated.index] == 1
-        factor = temperature_factor(logits, is_second, loss_weight[validated.index])
-        self._inference.soften(factor)
+        given = {} if sample_weight is None else {"sample_weight": sample_weight}
+        with FitTasks(self, hyperparameters.max_epochs, rows, labels, given) as tasks:
+            self._inference, self.history_ = self._train(
+                backend, hyperparameters, training, held_out, rng, weights, tasks
+            )
+            logits = self._logits_of(validated).astype(np.float64)
+            self._check_finite(logits)
+            factor = temperature_factor(logits, is_second, loss_weight[validated.index])
+            self._inference.soften(factor)
         right = (logits > 0) == is_second
         self.validation_accuracy_ = weighted_share(right, weight[validated.index])
         calibration = CalibrationCurve.of(is_second, expit(factor * logits))
@@ -428,6 +435,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
         held_out: LabelledRows,
         rng: np.random.Generator,
         weights: dict[str, NDArray[Any]] | None,
+        fit_tasks: FitTasks,
     ) -> tuple[Any, list[dict[str, float]]]:
         """Return what computes logits, and the history of the training."""
         training, held_out = training.weighted(), held_out.weighted()
@@ -452,6 +460,7 @@ class TransitionReliabilityClassifier(ClassifierMixin, BaseEstimator):
             checkpoint=self.checkpoint,
             verbose=self.verbose,
             weights=weights,
+            fit_tasks=fit_tasks,
         )
         trained, history = train(task)
         return backend.inference(self.n_features_in_, self._packed, trained), history

@@ -187,6 +187,7 @@ def test_every_public_name_documents_what_it_takes(thing):
                 "reliability/networks/batches.py",
                 "reliability/networks/checkpoint.py",
                 "reliability/networks/devices.py",
+                "reliability/networks/epoch_callback.py",
                 "reliability/networks/metrics.py",
                 "reliability/networks/mlp_module.py",
                 "reliability/networks/module_inference.py",
@@ -199,6 +200,7 @@ def test_every_public_name_documents_what_it_takes(thing):
             "skorch",
             {
                 "reliability/networks/checkpoint.py",
+                "reliability/networks/epoch_callback.py",
                 "reliability/networks/metrics.py",
                 "reliability/networks/progress.py",
                 "reliability/networks/training.py",

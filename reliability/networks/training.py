@@ -6,15 +6,18 @@ import os
 from functools import partial
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 from numpy.typing import NDArray
 from skorch import NeuralNet
 from skorch.callbacks import Callback, EarlyStopping, LRScheduler
 from skorch.helper import predefined_split
 
+from reliability.fit_callbacks import FitTasks
 from reliability.networks.batches import Batches, LabelledRows, digest
 from reliability.networks.checkpoint import Checkpoint
 from reliability.networks.devices import check_device, one_thread
+from reliability.networks.epoch_callback import EpochCallback
 from reliability.networks.hyperparameters import Hyperparameters, as_plain
 from reliability.networks.metrics import CALIBRATED_LOSS, EpochMetrics, WeightedLoss
 from reliability.networks.progress import ProgressBar
@@ -36,6 +39,7 @@ class TrainingTask(NamedTuple):
     checkpoint: str | os.PathLike[str] | None
     verbose: int
     weights: dict[str, NDArray[Any]] | None = None  # to start from; None for random ones
+    fit_tasks: FitTasks | None = None  # tells scikit-learn's callbacks, if there are any
 
 
 def train(task: TrainingTask) -> tuple[dict[str, NDArray[Any]], list[dict[str, float]]]:
@@ -63,15 +67,16 @@ def train(task: TrainingTask) -> tuple[dict[str, NDArray[Any]], list[dict[str, f
     """
     check_device(task.device)
     cuda_devices = [task.device] if task.device.startswith("cuda") else []
-    stop = _early_stopping(task)
+    stop, epochs = _early_stopping(task), _epoch_callback(task)
     with one_thread(), torch.random.fork_rng(cuda_devices):
         torch.manual_seed(task.seed)
-        net = _network(task, _callbacks(task, stop))
+        net = _network(task, _callbacks(task, stop, epochs))
         net.fit(task.training)
     history = net.history.to_list()
     # skorch ends the training quietly when the user interrupts it.
     is_whole = len(history) == task.hyperparameters.max_epochs and "train_loss" in history[-1]
-    if not is_whole and not _has_stopped(stop):
+    told_to_stop = _has_stopped(stop) or (epochs is not None and epochs.stopped)
+    if not is_whole and not told_to_stop:
         raise KeyboardInterrupt
     weights = task.backend.weights(net.module_)
     rows = [{name: as_plain(row[name]) for name in _RECORDED if name in row} for row in history]
@@ -102,7 +107,9 @@ def _network(task: TrainingTask, callbacks: list[tuple[str, Callback]]) -> Neura
     )
 
 
-def _callbacks(task: TrainingTask, stop: EarlyStopping | None) -> list[tuple[str, Callback]]:
+def _callbacks(
+    task: TrainingTask, stop: EarlyStopping | None, epochs: EpochCallback | None
+) -> list[tuple[str, Callback]]:
     chosen = task.hyperparameters
     decay = LRScheduler(
         torch.optim.lr_scheduler.StepLR,
@@ -113,6 +120,8 @@ def _callbacks(task: TrainingTask, stop: EarlyStopping | None) -> list[tuple[str
     if task.verbose:
         n_batches = -(-_rows_per_epoch(task) // chosen.batch_size)
         callbacks.insert(0, ("progress", ProgressBar(chosen.max_epochs, n_batches)))
+    if epochs is not None:
+        callbacks.append(("epochs", epochs))
     if stop is not None:
         callbacks.append(("stop", stop))
     if task.checkpoint is not None:
@@ -129,6 +138,13 @@ def _early_stopping(task: TrainingTask) -> EarlyStopping | None:
     return EarlyStopping(
         CALIBRATED_LOSS, patience=patience, threshold=0.0, load_best=True, sink=_no_output
     )
+
+
+def _epoch_callback(task: TrainingTask) -> EpochCallback | None:
+    if task.fit_tasks is None or not task.fit_tasks.any:
+        return None
+    rows = task.training.rows
+    return EpochCallback(task.fit_tasks, task.backend, rows.shape[1], rows.dtype == np.uint8)
 
 
 def _has_stopped(stop: EarlyStopping | None) -> bool:
