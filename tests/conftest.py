@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 from contextlib import contextmanager
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from toy_systems import Disc
 from planners import BiasedRRTConnect
 from reliability import TransitionReliabilityClassifier, collect_transitions
 from systems import PlanarArm
+from systems.extras import MODULES
 
 
 @pytest.hookimpl(wrapper=True)
@@ -32,13 +35,21 @@ def skipping_without_extras():
     """Skip a test that comes upon an extra which is not installed, such as torch."""
     try:
         yield
-    except Exception as error:
-        cause = error
-        while cause is not None:
-            if isinstance(cause, ModuleNotFoundError) and "pip install" in str(cause):
-                pytest.skip(str(cause))
-            cause = cause.__cause__
+    except (Exception, pytest.fail.Exception) as error:
+        reason = missing_extra(error)
+        if reason is not None:
+            pytest.skip(reason)
         raise
+
+
+def missing_extra(error):
+    """Return which extra an error, or what led to it, asks for, if it is not installed."""
+    while error is not None:
+        asked = re.search(r"pip install 'transition-reliability\[(\w+)\]'", str(error))
+        if asked and any(find_spec(module) is None for module in MODULES[asked[1]]):
+            return f"needs the extra [{asked[1]}]"
+        error = error.__cause__ or error.__context__
+    return None
 
 
 def pytest_terminal_summary(terminalreporter):

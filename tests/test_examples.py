@@ -21,6 +21,10 @@ RUNS = {
         {"N_PLANS": "40", "N_PROBLEMS": "3"},
         [r"no classifier +3 ", r"logistic regression +\d\d", r"calibrated network +\d\d"],
     ),
+    "held_out_plans.py": (
+        {"N_PLANS": "40"},
+        [r"split by rows: \d\d", r"trees, split by plans: \d\d", r"network, split by plans: \d\d"],
+    ),
     "own_system.py": ({}, [r"without .* ends at \[1\.\d+ +3", r"with .* ends at \[0\.5 +3"]),
     "own_simulator.py": ({}, [r"\d+ transitions, [1-9]\d% of them Unreliable"]),
     "own_scene.py": (
