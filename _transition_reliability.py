@@ -33,8 +33,8 @@ def check_packages(home: Path) -> None:
             )
         if not _is_marked(spec, name):
             raise ImportError(
-                f"{spec.origin} belongs to another distribution, which has overwritten the file of "
-                f"transition-reliability. {_REMEDY}"
+                f"{home / name / '__init__.py'} is not that of transition-reliability: another "
+                f"distribution has overwritten or removed it. {_REMEDY}"
             )
         for other in home.glob(f"{name}-*.dist-info"):
             if _brings(other, name):

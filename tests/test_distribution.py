@@ -110,8 +110,13 @@ def test_an_overwritten_package_is_noticed(site):
     """As by the distribution "reliability", installed into the same environment later."""
     (site / "reliability" / "__init__.py").write_text('__version__ = "0.9.0"\n')
     error = in_one_line(imported("planners", site).stderr)
-    assert "reliability/__init__.py belongs to another distribution" in error
+    assert "reliability/__init__.py is not that of transition-reliability: another" in error
     assert "uninstall both" in error
+    # As when that distribution is uninstalled again.
+    (site / "reliability" / "__init__.py").unlink()
+    gone = in_one_line(imported("planners", site).stderr)
+    # The repository's own copy may be found in its place.
+    assert gone == error or "needs its own package 'reliability'" in gone
 
 
 def test_a_folder_that_another_distribution_shares_is_noticed(site):
