@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.rope.penetration import centre_line, line_depth, walk
+from benchmarks.rope.penetration import centre_line, line_depth, main, walk
 from systems import Box, Capsule, Cylinder, Rope, Scene, random_rope_scene
 from systems.rope.obstacles.shapes import pack_obstacles
 from systems.rope.obstacles.signed_distance import signed_distance
@@ -94,3 +94,17 @@ def test_a_rope_that_is_laid_through_an_obstacle_settles_outside_or_not_at_all(e
     laid[1:-1, 2] = 0.106
     state = rope._execution.settle(laid)
     assert line_depth(centre_line(state, scene, engine), scene) <= MILLIMETRE
+
+
+def test_the_benchmark_tells_the_depth_in_returned_states_and_on_the_way(capsys):
+    few = ["--random-scenes", "0", "--seeds", "1", "--scenes", "simple_hook_short"]
+    main([*few, "--engines", "mujoco", "--moves", "walks"])
+    header, row, total = capsys.readouterr().out.splitlines()
+    assert "deepest" in header
+    assert row.split()[:3] == ["mujoco", "walks", "simple_hook_short"]
+    n_states, errors, deepest, _, _, above, lines, bands, on_the_way, _ = row.split()[3:]
+    assert int(n_states) > 100
+    assert (errors, above) == ("0", "0.00%")
+    assert 0.5 < float(deepest) == float(lines) <= 1.0 < float(on_the_way) < 6.0
+    assert 0.0 < float(bands) < 10.0, "the band's line is outside"
+    assert total.split("all of these")[1].split() == row.split()[3:]

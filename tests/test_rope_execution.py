@@ -184,6 +184,15 @@ def test_near_the_limit_every_stride_waits_for_the_rope_to_come_out(over_floor):
     assert len(obedient.steps) == len(obedient.strides) + 5
 
 
+def test_a_taut_rope_that_stays_deep_in_an_obstacle_is_overstretched(over_floor):
+    rollout, obedient = over_floor
+    start = rollout.execute(state_of(rollout), [APART.ravel()] * 10).states[-2]
+    obedient.sunk = 0.024
+    executed = rollout.execute(start, [0.1 * APART.ravel()])
+    assert executed.stop_reason is RopeStopReason.OVERSTRETCHED
+    np.testing.assert_array_equal(executed.states[-1].nodes, start.nodes)
+
+
 def test_a_rope_that_is_too_long_needs_not_come_out(over_floor):
     rollout, obedient = over_floor
     obedient.sunk, obedient.growth_at_rest = 0.024, 0.1

@@ -102,7 +102,7 @@ class RopeRollout:
         engine.load(RopeState(laid[[0, -1]], laid))
         for _ in range(SETTLING_STEPS // STEPS_PER_STRIDE - 1):
             engine.step(STEPS_PER_STRIDE)
-        return self._rested(STEPS_PER_STRIDE)
+        return self._rested(STEPS_PER_STRIDE)[0]
 
     def execute(self, state: RopeState, commands: ArrayLike) -> Rollout:
         """Carry out commands in turn.
@@ -145,8 +145,8 @@ class RopeRollout:
         legal, arrived = self._move(before, share * move)
         if not arrived:
             return legal, RopeStopReason.OVERSTRETCHED
-        rested = self._rested(RESTING_STEPS)
-        if rope_length(rested) > self.scene.max_band_length:
+        rested, allowed = self._rested(RESTING_STEPS)
+        if not allowed:
             return legal, RopeStopReason.OVERSTRETCHED
         if share < 1.0:
             return rested, RopeStopReason.GRIPPER_CONTACT
@@ -167,26 +167,29 @@ class RopeRollout:
             if length <= limit - LENGTH_MARGIN:
                 engine.step(STEPS_PER_STRIDE)
                 continue
-            state = self._rested(STEPS_PER_STRIDE)
-            length = rope_length(state)
-            if length > limit:
+            state, allowed = self._rested(STEPS_PER_STRIDE)
+            if not allowed:
                 return legal, False
-            legal = state
+            legal, length = state, rope_length(state)
         return legal, True
 
-    def _rested(self, n_steps: int) -> RopeState:
-        """Let the rope follow its grippers, and come out of obstacles unless it is too long anyway.
+    def _rested(self, n_steps: int) -> tuple[RopeState, bool]:
+        """Let the rope follow its grippers, and say whether it may be so.
 
-        A taut rope that snaps over an edge is deep in it for some hundredths of a second.
+        A taut rope that snaps over an edge is deep in it for some hundredths of a second, and gets
+        that time. One that is pulled around a cylinder until it trembles may not come out of it: it
+        is overstretched.
         """
-        engine = self._engine()
+        engine, limit = self._engine(), self.scene.max_band_length
         for _ in range(1 + MOST_RESTS):
             engine.step(n_steps)
             state = engine.save()
-            too_long = self._checked_length(state) > self.scene.max_band_length
-            if too_long or self._depth() <= LARGEST_DEPTH:
-                return state
+            length = self._checked_length(state)
+            if length > limit or self._depth() <= LARGEST_DEPTH:
+                return state, length <= limit
             n_steps = STEPS_PER_STRIDE
+        if length > limit - LENGTH_MARGIN:
+            return state, False
         raise SimulationDivergedError(
             f"The engine {self.engine!r} diverged: it left the rope's surface "
             f"{1e3 * self._depth():.1f} mm deep in an obstacle, at most 1 mm is allowed."
