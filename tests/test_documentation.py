@@ -118,6 +118,7 @@ def test_the_page_on_what_did_not_help_can_be_followed(tmp_path, monkeypatch, ca
         "docs/labels.md",
         "docs/messages.md",
         "docs/plan_worth.md",
+        "docs/rope_contacts.md",
         "examples/README.md",
     ],
 )

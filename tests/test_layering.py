@@ -9,8 +9,9 @@ import pytest
 ROOT = Path(__file__).parents[1]
 # Each package knows only those before it.
 ROAD = ("systems", "reliability", "planners")
-# Training also learns from mirror images of the rope's features, which nobody else needs yet.
-INSIDERS = {ROOT / "benchmarks" / "rope" / "training.py"}
+# Training also learns from mirror images of the rope's features, and the depth of contacts is
+# measured inside the rope's engines: nobody else needs either yet.
+INSIDERS = {ROOT / "benchmarks" / "rope" / name for name in ("training.py", "penetration.py")}
 SYSTEMS = ("planar_arm", "car", "rope")
 
 

@@ -189,6 +189,17 @@ def test_stretched_rope_may_go_back():
     assert rollout.execute(caught, -forward[None]).stop_reason is StopReason.COMPLETED
 
 
+@every_engine
+def test_grippers_stop_at_the_bounds_of_the_scene(engine):
+    rope = Rope("simple_hook_short", engine)
+    start = rope.scene_problem().start
+    up = rope.rollout(start, [[0.0, 0.0, 2.0] * 2])
+    assert up.stop_reason is RopeStopReason.EDGE_OF_WORLD
+    assert up.n_completed == 0
+    np.testing.assert_allclose(up.states[-1].grippers[:, 2], rope.scene.bounds[1, 2], atol=1e-9)
+    assert (up.states[-1].grippers <= rope.scene.bounds[1]).all()
+
+
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(arrays(float, (8, 6), elements=st.floats(-0.1, 0.1)))
 def test_no_motion_leads_past_a_boundary(commands):

@@ -34,6 +34,8 @@ class ObedientRope:
     growth_at_rest: float = 0.0
     growth_per_stride: float = 0.0
     extra: float = 0.0
+    sunk: float = 0.0
+    rises_per_step: float = 0.0
     strides: list = field(default_factory=list)
     steps: list = field(default_factory=list)
 
@@ -50,6 +52,11 @@ class ObedientRope:
         )
         return RopeState(self.grippers.copy(), nodes)
 
+    def centre_line(self):
+        line = self.save().nodes
+        line[1:-1, 2] -= max(0.0, self.sunk)
+        return line
+
     def move_grippers(self, grippers):
         self.strides.append(np.linalg.norm(grippers - self.grippers, axis=1).max())
         self.grippers = grippers.copy()
@@ -57,6 +64,7 @@ class ObedientRope:
 
     def step(self, n_steps):
         self.steps.append(n_steps)
+        self.sunk -= n_steps * self.rises_per_step
         if n_steps == 4:
             self.extra += self.growth_at_rest
 
@@ -131,6 +139,68 @@ def test_a_rope_of_half_more_than_the_limit_shows_that_the_engine_diverged(rope)
         else:
             with pytest.raises(error, match=r"made the rope 1\.1 m long, at most 0\.69 m"):
                 rollout.execute(state_of(rollout), np.zeros((1, 6)))
+
+
+@pytest.fixture
+def over_floor(monkeypatch):
+    """A rollout whose rope is 2 cm above a floor, and that rope."""
+    floor = Box((0.0, 0.0, -0.08), (1.0, 1.0, 0.05))
+    scene = Scene([floor], [[-1.0] * 3, [1.0] * 3], LENGTH, START, START + np.array([0.9, 0, 0]))
+    obedient = ObedientRope(scene.obstacles, scene.n_nodes, scene.link_length)
+    monkeypatch.setitem(ENGINES, "mujoco", lambda *arguments: obedient)
+    return RopeRollout(scene, "mujoco"), obedient
+
+
+def test_a_rope_that_is_deep_in_an_obstacle_rests_until_it_is_out(over_floor):
+    rollout, obedient = over_floor
+    obedient.sunk, obedient.rises_per_step = 0.024, 0.00035
+    executed = rollout.execute(state_of(rollout), [np.zeros(6)] * 2)
+    assert executed.stop_reason is StopReason.COMPLETED
+    # It is 4 mm deep at first, 2.6 after the usual rest, and 0.5 after ten time steps.
+    assert obedient.steps == [4, 2, 2, 2, 4]
+
+
+def test_a_rope_that_stays_deep_in_an_obstacle_shows_that_the_engine_diverged(over_floor):
+    rollout, obedient = over_floor
+    obedient.sunk = 0.024
+    deep = r"surface 4\.0 mm deep in an obstacle, at most 1 mm is allowed"
+    with pytest.raises(SimulationDivergedError, match=deep):
+        rollout.execute(state_of(rollout), [np.zeros(6)])
+    assert sum(obedient.steps) < 1000
+    with pytest.raises(SimulationDivergedError, match=deep):
+        rollout.settle(state_of(rollout).nodes)
+
+
+def test_near_the_limit_every_stride_waits_for_the_rope_to_come_out(over_floor):
+    rollout, obedient = over_floor
+    start = rollout.execute(state_of(rollout), [APART.ravel()] * 10).states[-2]
+    obedient.steps.clear()
+    obedient.strides.clear()
+    obedient.sunk, obedient.rises_per_step = 0.024, 0.0003
+    executed = rollout.execute(start, [APART.ravel()])
+    assert executed.stop_reason is RopeStopReason.OVERSTRETCHED
+    assert LIMIT - 0.003 < rope_length(executed.states[-1]) <= LIMIT
+    # At 0.3 mm in a time step, 12 are needed for 3 mm: five more groups of two than one.
+    assert len(obedient.steps) == len(obedient.strides) + 5
+
+
+def test_a_taut_rope_that_stays_deep_in_an_obstacle_is_overstretched(over_floor):
+    rollout, obedient = over_floor
+    start = rollout.execute(state_of(rollout), [APART.ravel()] * 10).states[-2]
+    obedient.sunk = 0.024
+    executed = rollout.execute(start, [0.1 * APART.ravel()])
+    assert executed.stop_reason is RopeStopReason.OVERSTRETCHED
+    np.testing.assert_array_equal(executed.states[-1].nodes, start.nodes)
+
+
+def test_a_rope_that_is_too_long_needs_not_come_out(over_floor):
+    rollout, obedient = over_floor
+    obedient.sunk, obedient.growth_at_rest = 0.024, 0.1
+    start = state_of(rollout)
+    executed = rollout.execute(start, [np.zeros(6)])
+    assert executed.stop_reason is RopeStopReason.OVERSTRETCHED
+    np.testing.assert_array_equal(executed.states[-1].nodes, start.nodes)
+    assert obedient.steps == [4]
 
 
 def test_a_rope_settles_between_grippers_that_stand_still(rope):

@@ -20,6 +20,9 @@ class RopeEngine(Protocol):
     def save(self) -> RopeState:
         """Return the present state."""
 
+    def centre_line(self) -> Array:
+        """Return points on the rope's centre line, which straight lines between them make up."""
+
     def move_grippers(self, grippers: Array) -> None:
         """Put the grippers, of shape (2, 3), where they are to be."""
 

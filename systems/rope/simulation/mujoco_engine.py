@@ -73,7 +73,14 @@ class MujocoRope:
         """Return the present state."""
         simulation = np.empty(self._mujoco.mj_stateSize(self._model, self._content))
         self._mujoco.mj_getState(self._model, self._data, simulation, self._content)
-        return RopeState(self._data.mocap_pos.copy(), self.nodes(), simulation)
+        return RopeState(self._data.mocap_pos.copy(), self.centre_line(), simulation)
+
+    def centre_line(self) -> Array:
+        """Return the rope's nodes, of shape (n_nodes, 3)."""
+        nodes = self._rest.copy()
+        nodes[1:-1] += self._data.qpos.reshape(-1, 3)
+        nodes[[0, -1]] = self._data.mocap_pos
+        return nodes
 
     def move_grippers(self, grippers: Array) -> None:
         """Put the grippers, of shape (2, 3), where they are to be."""
@@ -95,13 +102,6 @@ class MujocoRope:
                 self._mujoco.mjtWarning(index).name for index in np.flatnonzero(data.warning.number)
             ]
             raise SimulationDivergedError(f"MuJoCo stopped simulating the rope: {warnings}.")
-
-    def nodes(self) -> Array:
-        """Return the rope's nodes, of shape (n_nodes, 3)."""
-        nodes = self._rest.copy()
-        nodes[1:-1] += self._data.qpos.reshape(-1, 3)
-        nodes[[0, -1]] = self._data.mocap_pos
-        return nodes
 
 
 def _describe(obstacles: Sequence[Obstacle], rest: Array) -> str:

@@ -58,6 +58,7 @@ class PybulletRope:
         self._obstacles = tuple(obstacles)
         self._n_nodes = n_nodes
         self._spacing = spacing * SCALE
+        self._ends = [0.0, 0.0, -self._spacing / 2], [0.0, 0.0, self._spacing / 2]
         self._disconnect: Any = lambda: None
 
     def load(self, state: RopeState) -> None:
@@ -90,6 +91,17 @@ class PybulletRope:
             ]
         )
         return RopeState(self._held.copy(), nodes, simulation)
+
+    def centre_line(self) -> Array:
+        """Return both ends of the axis of each capsule in turn, of shape (2 * n_nodes, 3)."""
+        bullet, client = self._bullet, self._client
+        poses = [bullet.getBasePositionAndOrientation(link, client) for link in self._links]
+        ends = [
+            bullet.multiplyTransforms(*pose, end, UPRIGHT)[0]
+            for pose in poses
+            for end in self._ends
+        ]
+        return np.array(ends) / SCALE
 
     def move_grippers(self, grippers: Array) -> None:
         """Put the grippers, of shape (2, 3), where they are to be."""
@@ -169,7 +181,7 @@ class PybulletRope:
             self._add_link(shape, place, row.tolist())
             for place, row in zip(places, rows, strict=True)
         ]
-        tip, tail = [0.0, 0.0, self._spacing / 2], [0.0, 0.0, -self._spacing / 2]
+        tail, tip = self._ends
         for link, following in zip(self._links[:-1], self._links[1:], strict=True):
             self._join(link, following, tip, tail)
 

@@ -27,7 +27,9 @@ class RopeState:
     grippers : ndarray of shape (2, 3)
         Positions of grippers A and B, which hold the first and the last node.
     nodes : ndarray of shape (n_nodes, 3)
-        The rope's centre line, from A to B.
+        Points on the rope's centre line, from A to B. The engine "mujoco" joins them by straight
+        capsules. With "pybullet" they are the middles of capsules, which meet between them: where
+        the rope bends around an edge, straight lines from node to node cut the corner.
     simulation : ndarray or None
         What else the engine needs to go on from here; only the engine that wrote it can read it.
         None means that the rope is at rest, which any engine can start from.
