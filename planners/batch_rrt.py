@@ -7,13 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.budget import Budget
+from planners.budget import Budget, free_edges
 from planners.check_transition import CheckTransition
 from planners.path import Path
 from planners.planning_problem import PlanningProblem
 from planners.search_tree import SearchTree
 from systems.angles import shortest_way
 from systems.system import Array
+from systems.validation import MOST
 
 EXTENSIONS_PER_ROUND = 8
 GOAL_BIAS = 0.1
@@ -57,7 +58,8 @@ class BatchRRT:
         self._commands = [system.steer(problem.starts, configurations)]
         self._tried_goal: set[int] = set()
         diagonal = float(np.linalg.norm(system.bounds[1] - system.bounds[0]))
-        self._most_steps = int(LONGEST_EXTENSION * diagonal / system.step_size)
+        self._most_steps = int(min(LONGEST_EXTENSION * diagonal / system.step_size, MOST))
+        self._free_steps = free_edges(system.bounds, system.step_size)
 
     def grow(self, budget: Budget) -> Path | None:
         """Grow the tree until a node is a goal; return the path to it, or None without one."""
@@ -70,6 +72,7 @@ class BatchRRT:
                 return None
             extensions = _joined(extensions, self._started(n_idle, ended))
             added, extensions, ended = self._extended(extensions)
+            budget.pay(int((extensions.n_steps > self._free_steps).sum()))
             at_goal = self._first_at_goal(added)
         nodes = self.tree.path_from_root(at_goal)
         return Path(self.tree.reduced[nodes], np.concatenate(self._commands)[nodes[1:]])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.budget import Budget
+from planners.budget import Budget, free_edges
 from planners.edge_checker import EdgeChecker
 from planners.planning_problem import PlanningProblem
 from planners.search_tree import SearchTree
@@ -47,6 +47,7 @@ class BatchRRTConnect:
         self._to_goal = SearchTree(problem.goals, dim, self._angular)
         self._checker = checker
         self._longest_edge = longest_edge
+        self._free_edges = free_edges(problem.system.bounds, longest_edge)
         self._rng = rng
 
     def grow(self, budget: Budget) -> Array | None:
@@ -57,7 +58,7 @@ class BatchRRTConnect:
             low, high = self._bounds
             samples = self._rng.uniform(low, high, size=(EXTENSIONS_PER_ROUND, len(low)))
             added, _ = self._extend(tree, samples, tree.nearest(samples))
-            met = self._connect(other, tree.reduced[added])
+            met = self._connect(other, tree.reduced[added], budget)
             if met is not None:
                 target, arrived = met
                 return self._path(tree, int(added[target]), other, arrived)
@@ -83,7 +84,7 @@ class BatchRRTConnect:
         extended = np.flatnonzero(accepted)
         return tree.add(ends[extended], nearest[extended]), extended
 
-    def _connect(self, tree: SearchTree, targets: Array) -> tuple[int, int] | None:
+    def _connect(self, tree: SearchTree, targets: Array, budget: Budget) -> tuple[int, int] | None:
         """Grow towards each target until it is reached or an edge to it is rejected.
 
         Returns
@@ -93,7 +94,11 @@ class BatchRRTConnect:
         """
         active = np.arange(len(targets))
         nodes = tree.nearest(targets)
+        n_edges = 0
         while len(active):
+            n_edges += 1
+            if n_edges > self._free_edges and not budget.pay(len(active)):
+                break
             added, extended = self._extend(tree, targets[active], nodes)
             active, nodes = active[extended], added
             arrived = np.flatnonzero((tree.reduced[nodes] == targets[active]).all(axis=1))

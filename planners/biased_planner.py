@@ -22,7 +22,7 @@ from planners.edge_checker import EdgeChecker
 from planners.path import Path
 from planners.plan_robustness import plan_robustness
 from planners.plan_turning import plan_turning
-from planners.planning_problem import PlanningProblem
+from planners.planning_problem import PlanningProblem, check_space
 from planners.progress import Progress
 from planners.restarts import best_until_enough
 from planners.result import PlanResult, PlanStatus
@@ -144,11 +144,17 @@ class BiasedPlanner(BaseEstimator):
         """Plan with one seed after another, until nothing is left of the time."""
         seed, limit = as_seed(self.random_state), self.time_limit
         for number in range(1 + int(self.restarts)):
+            began = time.perf_counter()
             plan = self._plan_once(_restart_seed(seed, number), limit, starts, goal, terminated)
             yield replace(plan, random_state=seed)
             if plan.status in (PlanStatus.TIME_LIMIT, PlanStatus.TERMINATED):
                 return
-            limit = None if limit is None else max(0.0, limit - plan.planning_time)
+            if limit is not None:
+                # Preparing a search takes its time too.
+                taken = time.perf_counter() - began - plan.simplification_time
+                limit = max(0.0, limit - taken)
+                if limit == 0:
+                    return
 
     def _plan_once(
         self,
@@ -224,6 +230,7 @@ class BiasedPlanner(BaseEstimator):
     def _check_parameters(self) -> None:
         if not isinstance(self.system, System):
             raise ValueError(f"system must be a System, got {self.system!r}.")
+        check_space(self.system)
         check_choice(self.acceptance, "acceptance", ACCEPTANCES)
         check_flag(self.simplify, "simplify")
         check_count(self.max_iterations, "max_iterations")

@@ -8,6 +8,21 @@ from collections.abc import Callable
 import numpy as np
 
 from planners.result import PlanStatus
+from systems.system import Array
+
+# As many edges of one extension cost no iterations of their own, or fewer where fewer lead across
+# the bounds.
+MOST_FREE_EDGES = 1000
+
+
+def free_edges(bounds: Array, longest_edge: float) -> int:
+    """Return how many edges of one extension are part of its iteration.
+
+    As many as a straight way from one corner of the bounds to the opposite one needs. Further ones
+    cost an iteration each, so that an extension that never arrives ends with the budget.
+    """
+    needed = float(np.linalg.norm(bounds[1] - bounds[0])) / longest_edge
+    return int(min(needed + 1, MOST_FREE_EDGES))
 
 
 def never() -> bool:
@@ -48,6 +63,11 @@ class Budget:
         self._terminated = terminated
         self._advanced = advanced
         self.limit = PlanStatus.ITERATION_LIMIT
+
+    def pay(self, n_edges: int = 1) -> bool:
+        """Take an iteration for each edge that is not free; say whether that many were left."""
+        self._left -= n_edges
+        return self._left >= 0
 
     def exhausted(self, n_iterations: int = 1) -> bool:
         """Take iterations from the budget, or return True where it doesn't allow them."""

@@ -87,7 +87,7 @@ class GoalSampler:
             If the region gives nothing that a plan may end at; says what was wrong.
         """
         places = starts[:, : self.system.configuration_dim]
-        inside = places[np.asarray(self.region.distance(places)) <= 0]
+        inside = places[distance_to(self.region, places) <= 0]
         if len(inside):
             return inside
         for _ in range(MOST_BATCHES):
@@ -108,8 +108,10 @@ class GoalSampler:
     def _sampled(self, n: int) -> Array:
         drawn = self.region.sample(self.rng, n)
         name = f"{type(self.region).__name__}.sample"
+        if n == 0 or (isinstance(drawn, list) and not drawn):
+            return np.empty((0, self.system.configuration_dim))
         goals = as_array(drawn, name, (None, self.system.configuration_dim))
-        return _wrapped(self.system, goals)
+        return _wrapped(self.system, goals[:n])
 
 
 def has_succeeded(system: System, problem: Problem, state: object, tolerance: float) -> bool:
@@ -117,7 +119,13 @@ def has_succeeded(system: System, problem: Problem, state: object, tolerance: fl
     if not isinstance(problem.goal, GoalRegion):
         return bool(system.succeeded(state, problem.goal, tolerance))
     configuration = system.reduce(state)[None, : system.configuration_dim]
-    return bool(problem.goal.distance(configuration)[0] <= tolerance)
+    return bool(distance_to(problem.goal, configuration)[0] <= tolerance)
+
+
+def distance_to(region: GoalRegion, configurations: Array) -> Array:
+    """Return how far configurations are from a region, after checking what it says."""
+    name = f"{type(region).__name__}.distance"
+    return as_array(region.distance(configurations), name, (len(configurations),))
 
 
 def trusted(system: System, goals: Array, check: CheckTransition) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
 
-from planners.budget import Budget
+from planners.budget import Budget, free_edges
 from planners.edge_checker import EdgeChecker
 from planners.ompl_globals import BorrowedSeeds, Silence
 from planners.planning_problem import PlanningProblem
@@ -49,13 +49,14 @@ def ompl_rrt_connect(
     with Silence(), BorrowedSeeds(seed) as seeds:
         setup = _simple_setup(problem)
         information = setup.getSpaceInformation()
-        information.setMotionValidator(
-            _EdgeValidator(information, checker, problem.starts.shape[1])
-        )
+        n_free = free_edges(problem.system.bounds, longest_edge)
+        validator = _EdgeValidator(information, checker, problem.starts.shape[1], budget, n_free)
+        information.setMotionValidator(validator)
 
         def exhausted() -> bool:
             # OMPL has seeded all generators of the search before it first asks.
             seeds.give_back()
+            validator.n_edges = 0
             return budget.exhausted()
 
         try:
@@ -117,12 +118,21 @@ def _solution(setup: Any, dim: int) -> Array | None:
 
 
 class _EdgeValidator(ob.MotionValidator):
-    def __init__(self, information: Any, checker: EdgeChecker, dim: int) -> None:
+    def __init__(
+        self, information: Any, checker: EdgeChecker, dim: int, budget: Budget, n_free: int
+    ) -> None:
         super().__init__(information)
         self._checker = checker
         self._dim = dim
+        self._budget = budget
+        self._n_free = n_free
+        self.n_edges = 0
 
     def checkMotion(self, start: Any, end: Any) -> bool:  # noqa: N802
+        self.n_edges += 1
+        # OMPL connects its trees edge by edge and asks for no budget meanwhile.
+        if self.n_edges > self._n_free and not self._budget.pay():
+            return False
         edge = np.array([start[0 : self._dim], end[0 : self._dim]])
         return bool(self._checker.accept(edge[:1], edge[1:])[0])
 

@@ -57,10 +57,15 @@ class BorrowedSeeds:
 
     def __enter__(self) -> BorrowedSeeds:
         self.lock.acquire()
-        self._borrowed = True
-        self._next = ou.RNG().getLocalSeed()
-        # OMPL calls a second seeding an error in its log, though it works.
-        ou.RNG.setSeed(self._seed)
+        try:
+            self._borrowed = True
+            self._next = ou.RNG().getLocalSeed()
+            # OMPL calls a second seeding an error in its log, though it works.
+            ou.RNG.setSeed(self._seed)
+        except BaseException:  # Ctrl-C must not leave the lock taken for ever
+            self._borrowed = False
+            self.lock.release()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -69,9 +74,11 @@ class BorrowedSeeds:
     def give_back(self) -> None:
         """Put the sequence back to where it was; does nothing the second time."""
         if self._borrowed:
-            self._borrowed = False
-            self._put_back()
-            self.lock.release()
+            try:
+                self._put_back()
+            finally:
+                self._borrowed = False
+                self.lock.release()
 
     def _put_back(self) -> None:
         begun_at = BorrowedSeeds._begun_at or ou.RNG.getSeed()

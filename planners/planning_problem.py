@@ -14,7 +14,7 @@ from planners.standing_still import can_stay
 from systems.angles import wrap_columns
 from systems.goal_region import GoalRegion
 from systems.system import Array, System
-from systems.validation import as_finite_array
+from systems.validation import as_finite_array, is_number
 
 MOST_GOALS = 1000
 
@@ -100,6 +100,24 @@ class PlanningProblem:
             goals = np.concatenate([goals, sampler.draw(BATCH)])
         most_trusted = _most_trusted(self.system, goals, check)
         return replace(self, goals=most_trusted, sampler=replace(sampler, check=check))
+
+
+def check_space(system: System) -> None:
+    """Raise ``ValueError`` unless a system's bounds and step size are such that a search ends."""
+    name, step, bounds = type(system).__name__, system.step_size, system.bounds
+    if not is_number(step) or not 0 < step < np.inf:
+        raise ValueError(f"{name}.step_size must be a positive number, got {step!r}.")
+    if not isinstance(bounds, np.ndarray):
+        raise ValueError(f"{name}.bounds must be a numpy array, got {bounds!r}.")
+    low, high = as_finite_array(bounds, f"{name}.bounds", (2, system.configuration_dim))
+    if (low > high).any():
+        raise ValueError(f"{name}.bounds must be lower limits, then upper ones, got {bounds!r}.")
+    farthest = float(np.abs(bounds).max())
+    if farthest + step == farthest:
+        raise ValueError(
+            f"{name}.step_size must be large enough to lead anywhere: {farthest!r} + {step!r}, "
+            "at the end of the bounds, is the same number again."
+        )
 
 
 def can_start(system: System, reduced: Array) -> bool:

@@ -60,6 +60,17 @@ class ItemFiles:
         """Return the file of an item, whether it is there or not."""
         return self.folder / f"{name}{SUFFIX}"
 
+    def check_writable(self) -> None:
+        """Raise ``StoreError`` if no file can be written here, before hours of work are lost."""
+        probe = self.folder / f".{uuid.uuid4().hex}{PARTIAL_SUFFIX}"
+        try:
+            probe.touch(exist_ok=False)
+            probe.unlink()
+        except OSError as error:
+            raise StoreError(
+                f"{self.folder} must be a folder that can be written: {error}."
+            ) from error
+
     def read(self, name: str) -> Item | None:
         """Read an item; None if there is no file.
 

@@ -18,7 +18,9 @@ def end_with_parent() -> None:
     A parent that is killed can't tell its workers, which would keep their memory, and the work
     that nobody waits for any more, for minutes.
     """
-    if multiprocessing.current_process().name.startswith("LokyProcess"):
+    name = multiprocessing.current_process().name
+    # Those of joblib's backends "loky" and "multiprocessing".
+    if name.startswith("LokyProcess") or "PoolWorker" in name:
         threading.Thread(target=_watch, args=(os.getppid(),), daemon=True).start()
 
 

@@ -199,12 +199,15 @@ def run_jobs(
     Raises
     ------
     StoreError
-        If a file can't be used. All files are looked at before any work begins.
+        If a file can't be used, or a folder in which something is missing can't be written. All
+        files are looked at before any work begins.
     """
     if not isinstance(jobs, Sequence) or not all(isinstance(job, Job) for job in jobs):
         raise ValueError(f"jobs must be a sequence of Job, got {jobs!r}.")
     items = [job.finished() for job in jobs]
     missing = [i for i, item in enumerate(items) if item is None]
+    for files in {jobs[i].store.files for i in missing if jobs[i].store is not None}:  # type: ignore[union-attr]
+        files.check_writable()
     tasks = (
         joblib.delayed(_run)(i, job.name, job.compute, job.store and job.store.files)
         for i, job in ((i, jobs[i]) for i in missing)

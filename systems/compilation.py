@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from numba import config, njit
+from numba.core.registry import CPUDispatcher
 
 LIBRARY = ("systems", "reliability", "planners")
 # numba reads the cache folder from a global variable when a function is decorated.
@@ -55,6 +56,13 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """
     if function is None:
         return lambda given: compiled(given, **options)
+    dispatcher = _dispatcher(function, options)
+    if str(function.__annotations__.get("return")).startswith("tuple"):
+        dispatcher.__class__ = _TupleDispatcher
+    return dispatcher
+
+
+def _dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     folder = _cache_folder(function.__module__)
     if folder is None:
         return njit(nogil=True, **options)(function)
@@ -64,6 +72,29 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
             return njit(nogil=True, cache=True, **options)(function)
         finally:
             config.CACHE_DIR = before
+
+
+class _TupleDispatcher(CPUDispatcher):
+    """A compiled function that returns a tuple, and which Ctrl-C interrupts as any other.
+
+    numba runs a little Python to make a numpy array of each array that is returned, and Python
+    handles signals there. numba then goes on to the tuple's next entry in spite of the
+    KeyboardInterrupt, and Python turns that into SystemError, whose cause it becomes.
+    """
+
+    def __call__(self, *args: Any) -> Any:
+        try:
+            return _call(self, *args)
+        except SystemError as error:
+            cause: BaseException | None = error
+            while isinstance(cause, SystemError):
+                cause = cause.__cause__
+            if cause is None:
+                raise
+            raise cause from None
+
+
+_call = CPUDispatcher.__call__
 
 
 def source_digest(module: str) -> str | None:

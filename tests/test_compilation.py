@@ -3,13 +3,16 @@
 import compileall
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import systems
+from planners import split_edges
 
 USES_CACHE = "print(kernels.total(1.0), sum(kernels.total.stats.cache_hits.values()))"
 
@@ -156,3 +159,19 @@ def test_processes_that_compile_at_once_do_not_disturb_one_another(library):
         out, errors = process.communicate()
         assert (out.split()[0], errors) == ("5.0", "")
     assert library.run()[0] == ["5.0", "1"]
+
+
+def test_control_c_in_compiled_code_that_returns_arrays_is_a_keyboard_interrupt():
+    # Thousands of transitions: nearly all of the time passes in compiled code.
+    starts = np.zeros((20, 2))
+    ends = np.full((20, 2), 300.0)
+    before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    try:
+        for delay in (0.002, 0.003, 0.005, 0.007):
+            with pytest.raises(KeyboardInterrupt):  # noqa: PT012
+                signal.setitimer(signal.ITIMER_REAL, delay)
+                while True:
+                    split_edges(starts, ends, 0.01)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)

@@ -25,7 +25,7 @@ _DIGEST_BYTES = 16
 class Checkpoint(Callback):
     """Writes all that a training needs to go on, after each epoch, and reads it at the start.
 
-    It must be the last callback.
+    It must come after all callbacks that have a state.
 
     Parameters
     ----------
@@ -94,8 +94,11 @@ class Checkpoint(Callback):
         content = io.BytesIO()
         torch.save(state, content)
         data = content.getvalue()
-        self._partial.write_bytes(_FIRST_LINE + _digest(data) + data)
-        os.replace(self._partial, self.path)
+        try:
+            self._partial.write_bytes(_FIRST_LINE + _digest(data) + data)
+            os.replace(self._partial, self.path)
+        finally:
+            self._partial.unlink(missing_ok=True)
 
     def _read(self, max_epochs: int) -> dict[str, Any]:
         state = _checked_state(self.path)

@@ -1,4 +1,4 @@
-"""The progress bar of a training."""
+"""How far a training has come: a progress bar, and a count of finished epochs."""
 
 from __future__ import annotations
 
@@ -60,3 +60,23 @@ class ProgressBar(Callback):
     def _show(self, numbers: dict[str, float], refresh: bool = False) -> None:
         self.shown_ |= {name: f"{number:.4f}" for name, number in numbers.items()}
         self.bar_.set_postfix(self.shown_, refresh=refresh)
+
+
+class FinishedEpochs(Callback):
+    """Counts the epochs of which all callbacks have seen the end; must be the last of them.
+
+    Attributes
+    ----------
+    n_epochs : int
+        Those that a checkpoint held included.
+    """
+
+    n_epochs = 0
+
+    def on_train_begin(self, net: NeuralNet, **kwargs: Any) -> None:
+        """Count the epochs of the checkpoint."""
+        self.n_epochs = len(net.history)
+
+    def on_epoch_end(self, net: NeuralNet, **kwargs: Any) -> None:
+        """Count this epoch."""
+        self.n_epochs = len(net.history)

@@ -20,7 +20,7 @@ from reliability.networks.devices import check_device, one_thread
 from reliability.networks.epoch_callback import EpochCallback
 from reliability.networks.hyperparameters import Hyperparameters, as_plain
 from reliability.networks.metrics import CALIBRATED_LOSS, EpochMetrics, WeightedLoss
-from reliability.networks.progress import ProgressBar
+from reliability.networks.progress import FinishedEpochs, ProgressBar
 
 # A training and its continuation may differ in this.
 _FREE = {"max_epochs"}
@@ -67,17 +67,17 @@ def train(task: TrainingTask) -> tuple[dict[str, NDArray[Any]], list[dict[str, f
     """
     check_device(task.device)
     cuda_devices = [task.device] if task.device.startswith("cuda") else []
-    stop, epochs = _early_stopping(task), _epoch_callback(task)
+    stop, epochs, finished = _early_stopping(task), _epoch_callback(task), FinishedEpochs()
     with one_thread(), torch.random.fork_rng(cuda_devices):
         torch.manual_seed(task.seed)
-        net = _network(task, _callbacks(task, stop, epochs))
+        callbacks = [*_callbacks(task, stop, epochs), ("finished", finished)]
+        net = _network(task, callbacks)
         net.fit(task.training)
-    history = net.history.to_list()
     # skorch ends the training quietly when the user interrupts it.
-    is_whole = len(history) == task.hyperparameters.max_epochs and "train_loss" in history[-1]
     told_to_stop = _has_stopped(stop) or (epochs is not None and epochs.stopped)
-    if not is_whole and not told_to_stop:
+    if finished.n_epochs < task.hyperparameters.max_epochs and not told_to_stop:
         raise KeyboardInterrupt
+    history = net.history.to_list()
     weights = task.backend.weights(net.module_)
     rows = [{name: as_plain(row[name]) for name in _RECORDED if name in row} for row in history]
     return weights, rows
@@ -125,7 +125,7 @@ def _callbacks(
     if stop is not None:
         callbacks.append(("stop", stop))
     if task.checkpoint is not None:
-        # The last, as it keeps the state of the others.
+        # After the others, as it keeps their state.
         checkpoint = Checkpoint(task.checkpoint, _identity(task), decay, stop)
         callbacks.append(("checkpoint", checkpoint))
     return callbacks

@@ -41,6 +41,7 @@ CLOSE_DISTANCE = 0.15
 GOAL_DISTANCE = CLOSE_DISTANCE
 # The least clearance of the starts and goals that are drawn, in metres.
 ROOM_AT_ENDS = 0.05
+_MOST_DRAWS = 10_000
 ROWS = "poses or displacements [x, y, θ]"
 
 
@@ -269,11 +270,12 @@ class Car(System):
     def sample_problem(self, random_state: RandomState = None) -> Problem:
         """Draw a goal pose, and a start at up to 2 m/s from which the car can brake in time."""
         rng = as_generator(random_state)
-        while True:
+        for _ in range(_MOST_DRAWS):
             pose = self._draw_free_pose(rng)
             start = np.array([*pose, rng.uniform(0, MAX_SPEED), 0.0])
             if self.execute(start[None], np.zeros((1, 3)))[1][0]:
                 return Problem(start, self._draw_free_pose(rng)[None])
+        raise ValueError(_no_room("place where a moving car could brake"))
 
     def goal_reached(self, reduced: Array, goal: Array) -> NDArray[np.bool_]:
         """Say for each row whether a pose is Close to one of the goal's: Goal_B."""
@@ -289,11 +291,12 @@ class Car(System):
         return bool((self.distance(here, poses) < tolerance).any())
 
     def _draw_free_pose(self, rng: np.random.Generator) -> Array:
-        while True:
-            low, high = self.bounds
+        low, high = self.bounds
+        for _ in range(_MOST_DRAWS):
             pose = rng.uniform(low, high)
             if self.clearance(pose[None])[0] > ROOM_AT_ENDS:
                 return pose
+        raise ValueError(_no_room("free pose"))
 
     def _checked_states(self, states: Array, name: str) -> Array:
         inside = clearances(states[:, :3], self._packed) <= 0
@@ -302,3 +305,10 @@ class Car(System):
                 f"{name} must not touch anything, and the car does at {states[inside][0]}."
             )
         return states
+
+
+def _no_room(wanted: str) -> str:
+    return (
+        f"scene must have room for a car, and none of {_MOST_DRAWS} poses was a {wanted}. Give it "
+        "wider bounds or fewer obstacles."
+    )

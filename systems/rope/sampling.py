@@ -13,6 +13,8 @@ from systems.rope.scene import GRIPPER_CLEARANCE, NODE_SPACING, ROPE_RADIUS, Sce
 # Starts are no nearer to the goal than this share of the distance between the scene's start and
 # goal: from behind all obstacles there is nothing to learn.
 LEAST_WAY = 0.75
+# Draws for one pair of grippers before giving up.
+_MOST_DRAWS = 200_000
 # Points for each link at which a hanging rope is checked for collisions.
 _CHECKS_PER_LINK = 4
 
@@ -33,11 +35,22 @@ def draw_grippers(scene: Scene, rng: np.random.Generator, n: int, reach: float) 
     Returns
     -------
     grippers : ndarray of shape (n, 6)
+
+    Raises
+    ------
+    ValueError
+        If there is hardly any clear space.
     """
     low, high = scene.bounds[0] + GRIPPER_CLEARANCE, scene.bounds[1] - GRIPPER_CLEARANCE
     bounds = np.tile(scene.bounds, 2)
-    drawn = np.empty((0, 6))
+    drawn, n_draws = np.empty((0, 6)), 0
     while len(drawn) < n:
+        if n_draws > _MOST_DRAWS * (1 + len(drawn)):
+            raise ValueError(
+                f"scene {scene.name!r} must have room for two grippers, and {n_draws} random "
+                f"places were clear {len(drawn)} times. Give it wider bounds or fewer obstacles."
+            )
+        n_draws += 2 * n
         first = rng.uniform(low, high, size=(2 * n, 3))
         second = rng.uniform(np.maximum(low, first - reach), np.minimum(high, first + reach))
         pairs = np.hstack([first, second])
