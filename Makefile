@@ -1,4 +1,4 @@
-# Verbs: arm, rope, car, test, check, bench, env, clean; test-newest, test-sdist, test-matrix.
+# Verbs: arm, rope, car, test, check, bench, env, clean; test-lowest, test-newest, test-sdist, test-matrix.
 PYTHON ?= python3.11
 ENV := .venv
 RUN := $(ENV)/bin/python
@@ -14,6 +14,13 @@ car: $(ENV)/ready ## no data to the car's tables and pictures, in build/car
 
 test: $(ENV)/ready check ## style, types and tests
 	$(RUN) -m pytest
+
+LOWEST := .venv-lowest
+test-lowest: ## with the lowest versions that setup.cfg allows, in an environment of their own
+	$(PYTHON) -m venv $(LOWEST)
+	$(PYTHON) tests/lowest_versions.py > $(LOWEST)/constraints.txt
+	$(LOWEST)/bin/python -m pip install --quiet --constraint $(LOWEST)/constraints.txt --editable ".[all,test]"
+	$(LOWEST)/bin/python -m pytest $(TESTS)
 
 # With the newest dependencies, in an environment for each Python; EXTRAS=test leaves out torch.
 EXTRAS ?= all,test
@@ -53,6 +60,6 @@ $(ENV)/ready: setup.cfg pyproject.toml constraints.txt
 	touch $@
 
 clean:
-	rm -rf $(ENV) .venv-newest build *.egg-info
+	rm -rf $(ENV) .venv-newest $(LOWEST) build *.egg-info
 
-.PHONY: arm rope car test test-newest test-sdist test-matrix check bench env clean
+.PHONY: arm rope car test test-lowest test-newest test-sdist test-matrix check bench env clean

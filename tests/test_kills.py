@@ -24,7 +24,8 @@ from planners import BiasedRRT, BiasedRRTConnect
 from reliability import MLP, TransitionReliabilityClassifier, collect_transitions
 from systems import PlanarArm, Rope
 
-N_KILLS = int(os.environ.get("KILLS", 100))
+# Fewer, such as KILLS=10, on a busy machine.
+N_KILLS = int(os.environ.get("KILLS", "100"))
 INTERRUPTED = 130
 SERVER = multiprocessing.get_context("forkserver")
 SERVER.set_forkserver_preload(["test_kills", "skorch", "sklearn.utils.validation", "mujoco"])
