@@ -4,7 +4,6 @@ Each test kills many processes, which takes minutes. A server that has imported 
 them, so that kills fall into the work and not into imports.
 """
 
-import atexit
 import contextlib
 import multiprocessing
 import os
@@ -13,7 +12,7 @@ import signal
 import sys
 import tempfile
 import time
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -48,9 +47,9 @@ class Slower(Disc):
         return super().rollout(state, commands)
 
 
-def collect(folder, n_jobs):
+def collect(folder):
     data = collect_transitions(
-        Slower(), BiasedRRTConnect(None), 30, n_jobs=n_jobs, random_state=1, path=folder / "data"
+        Slower(), BiasedRRTConnect(None), 30, random_state=1, path=folder / "data"
     )
     return pickle.dumps([data.reduced, data.command, data.y, data.plan])
 
@@ -104,16 +103,9 @@ def run(work, folder):
         (folder / "started").touch()
         result = work(folder)
     except KeyboardInterrupt:
-        leave(INTERRUPTED)
+        sys.exit(INTERRUPTED)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     (folder / "result").write_bytes(result)
-    leave(0)
-
-
-def leave(code):
-    """End as a process does that was not made by ``multiprocessing``, which skips the first."""
-    atexit._run_exitfuncs()
-    sys.exit(code)
 
 
 def started(work, folder):
@@ -173,11 +165,7 @@ def disturb(work, number, rng, base):
     return codes
 
 
-WORK = {
-    "collect": partial(collect, n_jobs=1),
-    "collect-2-jobs": partial(collect, n_jobs=2),
-    "train": train,
-}
+WORK = {"collect": collect, "train": train}
 ALONE = {
     "plan": plan,
     "execute-arm": execute_arm,
