@@ -15,3 +15,6 @@ from .rrt import BiasedRRT as BiasedRRT
 from .rrt_connect import BiasedRRTConnect as BiasedRRTConnect
 from .share import Share as Share
 from .success_calibration import SuccessCalibration as SuccessCalibration
+from .viewer.html_export import export_html as export_html
+from .viewer.viewer import Viewer as Viewer
+from .viewer.viewer import show as show

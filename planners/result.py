@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.result_plot import draw_plan
 from reliability.archive import read_arrays, write_arrays
 from systems.validation import as_finite_array, as_numbers, is_integer
 
@@ -169,6 +170,23 @@ class PlanResult:
         values["status"] = PlanStatus[values["status"]]
         values["random_state"] = int(values["random_state"])
         return cls(**values)
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw the search tree with the plan, and the reliability of each transition.
+
+        For a quick look: of configurations, the tree shows the first two entries. How the system
+        moves is shown by :func:`planners.show`.
+
+        Parameters
+        ----------
+        axes : sequence of two matplotlib Axes, default=None
+            None makes a figure.
+
+        Returns
+        -------
+        axes : sequence of two matplotlib Axes
+        """
+        return draw_plan(self, axes)
 
     def __repr__(self) -> str:
         return (

@@ -6,6 +6,12 @@ from .car.scenes import Circle as Circle
 from .car.scenes import ConvexPolygon as ConvexPolygon
 from .car.scenes import random_car_scene as random_car_scene
 from .contract_checks.check_system import check_system as check_system
+from .drawing.mujoco_shapes import mujoco_shapes as mujoco_shapes
+from .drawing.shapes import BoxShape as BoxShape
+from .drawing.shapes import CylinderShape as CylinderShape
+from .drawing.shapes import MeshShape as MeshShape
+from .drawing.shapes import SphereShape as SphereShape
+from .drawing.shapes import TubeShape as TubeShape
 from .errors import SimulationDivergedError as SimulationDivergedError
 from .errors import SystemContractError as SystemContractError
 from .features.body_frame import from_body_frame as from_body_frame

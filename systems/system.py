@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from systems.drawing.drawable import Drawable
 from systems.features.default import default_features
 from systems.features.names import DefaultFeatureNames
 from systems.goal_region import GoalRegion
@@ -77,7 +78,7 @@ class Rollout:
         )
 
 
-class System(ABC):
+class System(Drawable, ABC):
     """A robot in one scene (the paper's environment E): its true execution and a reduced model.
 
     Subclass it to plan for a system of your own, and pass an instance to
@@ -108,6 +109,9 @@ class System(ABC):
     (``n_jobs``). Leave simulators out of ``__getstate__``, and all else in it; start or connect one
     when a rollout first needs it, not in ``__init__``. Threads need one each.
     ``examples/own_simulator.py`` is a template.
+
+    *Pictures.* A system that also defines :meth:`draw` can be looked at in motion, with
+    :func:`planners.show`; ``docs/viewer.md`` shows how.
 
     Attributes
     ----------

@@ -6,7 +6,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from systems import MujocoObstacles, Problem, Rollout, StopReason, System
+from systems import MujocoObstacles, Problem, Rollout, StopReason, System, mujoco_shapes
 
 MODEL_FILE = Path(__file__).with_name("suspended_load.xml")
 free_space = MujocoObstacles(MODEL_FILE)  # of points, shape (..., 3): stacks and floor
@@ -78,6 +78,24 @@ class SuspendedLoad(System):
                 return state, True
             state = np.concatenate([data.qpos, data.qvel])
         return state, False
+
+    def _drawn(self, state, moving):
+        data = mujoco.MjData(self._model)
+        data.qpos = state[: self._model.nq]
+        return mujoco_shapes(self._model, data, moving=moving)
+
+    def draw(self, reduced):
+        """Return crane and load as if the load hung still."""
+        return self._drawn([*reduced[:2], 0, 0, TROLLEY_HEIGHT - reduced[2]], moving=True)
+
+    def draw_state(self, state):
+        return self._drawn(state, moving=True)
+
+    def draw_scene(self):
+        return self._drawn(np.zeros(5), moving=False)
+
+    def traced_points(self, configurations):
+        return configurations[:, None]
 
     def close(self, predicted, executed):
         return np.linalg.norm(predicted - executed, axis=1) < 0.15

@@ -14,6 +14,7 @@ from systems import (
     System,
     from_body_frame,
     motion_in_body_frame,
+    mujoco_shapes,
 )
 
 MODEL_FILE = Path(__file__).with_name("tractor_trailer.xml")
@@ -24,6 +25,12 @@ TRACTOR_RADIUS, TRACK, WHEEL_RADIUS = 0.32, 0.32, 0.1  # metres
 TOP_SPEED, TOP_TURN_RATE, LONGEST_COMMAND = 0.6, 1.5, 3.0  # m/s, rad/s and s
 # Where the features measure the free space, in the tractor's frame: ahead and left.
 SENSED = np.array([(a, b) for a in (-0.8, -0.4, 0, 0.4) for b in (-0.5, 0, 0.5)])
+
+
+def state_at_rest(x, y, heading):
+    """Return the true state with the trailer straight behind the tractor."""
+    pose = [x, y, WHEEL_RADIUS, np.cos(heading / 2), 0, 0, np.sin(heading / 2)]
+    return np.array([*pose, *[0] * 16])
 
 
 class TractorTrailer(System):
@@ -37,6 +44,7 @@ class TractorTrailer(System):
     reduced_dim, configuration_dim = 3, 2
     step_size = 0.4
     bounds = np.array([[0.35, 0.35], [ROOM - 0.35, ROOM - 0.35]])
+    view_from = (0.0, -0.4, 1.0)  # for pictures: from above, over the walls
     feature_names_out = ["ahead", "left", "sin_of_turn", "cos_of_turn"] + [
         f"space_{a:+}_ahead_{b:+}_left" for a, b in SENSED
     ]
@@ -91,6 +99,24 @@ class TractorTrailer(System):
             state = np.concatenate([data.qpos, data.qvel])
         return state, False
 
+    def _drawn(self, state, moving):
+        data = mujoco.MjData(self._model)
+        data.qpos = state[: self._model.nq]
+        return mujoco_shapes(self._model, data, moving=moving)
+
+    def draw(self, reduced):
+        """Return tractor and trailer as if the trailer were straight behind."""
+        return self._drawn(state_at_rest(*reduced), moving=True)
+
+    def draw_state(self, state):
+        return self._drawn(state, moving=True)
+
+    def draw_scene(self):
+        return self._drawn(state_at_rest(0, 0, 0), moving=False)
+
+    def traced_points(self, configurations):
+        return np.insert(configurations, 2, WHEEL_RADIUS, axis=1)[:, None]
+
     def close(self, predicted, executed):
         gap = predicted - executed
         return (np.linalg.norm(gap[:, :2], axis=1) < 0.15) & (np.cos(gap[:, 2]) > np.cos(0.5))
@@ -110,8 +136,7 @@ class TractorTrailer(System):
             behind = np.outer([0, -0.4, -0.8, -1.1], [np.cos(heading), np.sin(heading)])
             free = free_space(np.vstack([start + behind, goal])) > 0.4
             if free.all() and np.linalg.norm(goal - start) > 3:
-                pose = [*start, WHEEL_RADIUS, np.cos(heading / 2), 0, 0, np.sin(heading / 2)]
-                return Problem(np.concatenate([pose, np.zeros(16)]), goal[None])
+                return Problem(state_at_rest(*start, heading), goal[None])
 
     def goal_reached(self, reduced, goal):
         return (np.linalg.norm(reduced[:, None, :2] - goal, axis=2) < 1e-6).any(axis=1)

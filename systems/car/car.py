@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from systems.angles import shortest_way, wrap_columns
+from systems.car.drawing import drawn_car, drawn_goal, drawn_scene, traced_axle
 from systems.car.dynamics import (
     LONGEST_COMMAND,
     MAX_SPEED,
@@ -25,6 +26,7 @@ from systems.car.geometry import (
     straight_moves,
 )
 from systems.car.scenes import SCENES, CarScene, pack_scene
+from systems.drawing.shapes import Shape
 from systems.system import Array, Problem, Rollout, StopReason, System
 from systems.validation import (
     RandomState,
@@ -102,6 +104,7 @@ class Car(System):
     angular = (2,)
     step_size = STEP_SIZE
     feature_names_out = FEATURE_NAMES
+    view_from = (0.0, -0.5, 1.0)
 
     def __init__(self, scene: str | CarScene = "open_lot") -> None:
         if isinstance(scene, str):
@@ -223,6 +226,26 @@ class Car(System):
         own += CAR_RADIUS * np.column_stack([np.cos(around), np.sin(around)])
         turn = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
         return np.array([x, y]) + own @ turn
+
+    def draw(self, reduced: Array) -> list[Shape]:
+        """Return the car at a pose, its front darker."""
+        return drawn_car(self.outline(np.zeros(3))[:-1], reduced)
+
+    def draw_scene(self) -> list[Shape]:
+        """Return the ground, the walls and the obstacles."""
+        return drawn_scene(self.scene)
+
+    def draw_goal(self, configuration: Array) -> list[Shape]:
+        """Return the footprint at a goal's pose, and which way it points."""
+        return drawn_goal(self.outline(configuration), configuration)
+
+    def traced_points(self, configurations: Array) -> Array:
+        """Return the middle of the rear axle."""
+        return traced_axle(configurations)
+
+    def states_between(self, state: Any, command: Array) -> Array:
+        """Return the states every 0.01 s on the way of one command."""
+        return self.trace(state, command[None])
 
     def close(self, predicted: Array, executed: Array) -> NDArray[np.bool_]:
         """Say for each row whether two poses are less than α = 0.15 (m, rad) apart: Close."""

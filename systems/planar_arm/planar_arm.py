@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from systems.drawing.shapes import BoxShape, Color, Shape, SphereShape, TubeShape
 from systems.planar_arm.kernels import FEATURE_NAMES, limited_targets, transition_features
 from systems.planar_arm.kinematics import REACH, forward_kinematics, inverse_kinematics
 from systems.system import Array, Problem, Rollout, StopReason, System
@@ -26,6 +27,10 @@ CLOSE_DISTANCE = 0.075
 GOAL_DISTANCE = 1e-6
 HEADINGS_PER_TARGET = 8
 ROWS = "configurations of three joint angles"
+# For pictures: metres, and colours.
+DRAWN_RADIUS = 0.035
+LINK_COLOR: Color = (0.27, 0.44, 0.62, 1.0)
+JOINT_COLOR: Color = (0.16, 0.20, 0.26, 1.0)
 
 
 class PlanarArm(System):
@@ -56,6 +61,7 @@ class PlanarArm(System):
     bounds = np.array([[-np.pi] * 3, [np.pi] * 3])
     step_size = 0.01 * float(np.linalg.norm(bounds[1] - bounds[0]))
     feature_names_out = FEATURE_NAMES
+    view_from = (0.0, -1.0, 0.12)
 
     def reduce(self, state: Any) -> Array:
         """Return the joint angles of a true state: r, the identity."""
@@ -215,6 +221,27 @@ class PlanarArm(System):
         (configurations,) = as_rows(ROWS, 3, configurations=configurations)
         return forward_kinematics(configurations)
 
+    def draw(self, reduced: Array) -> list[Shape]:
+        """Return three links, joints and a tip."""
+        joints = _in_space(self.joint_positions(np.asarray(reduced)[None]))[0]
+        links = [
+            TubeShape(ends, DRAWN_RADIUS, LINK_COLOR)
+            for ends in np.stack([joints[:-1], joints[1:]], axis=1)
+        ]
+        radii = np.array([1.3, 1.3, 1.3, 1.0]) * DRAWN_RADIUS
+        return [
+            *links,
+            *(SphereShape(*joint, JOINT_COLOR) for joint in zip(joints, radii, strict=True)),
+        ]
+
+    def draw_scene(self) -> list[Shape]:
+        """Return the foot that the arm stands on."""
+        return [BoxShape(np.zeros(3), np.array([0.08, 0.05, 0.05]))]
+
+    def traced_points(self, configurations: Array) -> Array:
+        """Return where the arm's tip is."""
+        return _in_space(self.joint_positions(configurations))[:, -1:]
+
     def goal_reached(self, reduced: Array, goal: Array) -> NDArray[np.bool_]:
         """Say for each row whether a configuration is one of the goal's: Goal_B."""
         reduced, goal = as_rows(ROWS, 3, reduced=reduced, goal=goal)
@@ -240,6 +267,11 @@ class PlanarArm(System):
             start = self._draw_configuration(rng)
             if self.can_hold(start[None])[0]:
                 return start
+
+
+def _in_space(points: Array) -> Array:
+    """Return points x and z, (..., 2), as x, y and z."""
+    return np.insert(points, 1, 0.0, axis=-1)
 
 
 def _simulation() -> ArmSimulation:

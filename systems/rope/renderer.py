@@ -21,7 +21,7 @@ Image = NDArray[np.uint8]
 
 ROPE_COLOR: Color = (0.15, 0.65, 0.15, 1.0)
 BAND_COLOR: Color = (0.95, 0.60, 0.05, 1.0)
-_GRIPPER_COLOR: Color = (0.10, 0.25, 0.85, 1.0)
+GRIPPER_COLOR: Color = (0.10, 0.25, 0.85, 1.0)
 _GOAL_COLOR: Color = (0.90, 0.10, 0.10, 0.6)
 _WALL_COLOR: Color = (0.55, 0.35, 0.75, 0.35)
 _OUTER_WALL_COLOR: Color = (0.55, 0.35, 0.75, 0.08)
@@ -102,7 +102,7 @@ class SceneRenderer:
         for points, color in curves:
             for start, end in itertools.pairwise(points):
                 self._add_link(start, end, color)
-            self._add_spheres((points[0], points[-1]), _GRIPPER_COLOR)
+            self._add_spheres((points[0], points[-1]), GRIPPER_COLOR)
         if goal:
             self._add_spheres(self._scene.goal, _GOAL_COLOR, 1.5 * GRIPPER_RADIUS)
         image: Image = self._renderer.render()
@@ -136,7 +136,7 @@ class SceneRenderer:
 
 def _model_xml(scene: Scene, width: int, height: int) -> str:
     geoms = "\n".join(
-        geom_xml(obstacle, f'rgba="{numbers_xml(_obstacle_color(obstacle))}"')
+        geom_xml(obstacle, f'rgba="{numbers_xml(obstacle_color(obstacle))}"')
         for obstacle in scene.obstacles
     )
     high = scene.bounds[1] + (0.0, 0.0, 2.0)
@@ -158,7 +158,8 @@ def _model_xml(scene: Scene, width: int, height: int) -> str:
 </mujoco>"""
 
 
-def _obstacle_color(obstacle: Obstacle) -> Color:
+def obstacle_color(obstacle: Obstacle) -> Color:
+    """Return the colour of an obstacle, which follows from its name."""
     if "outer wall" in obstacle.name:
         return _OUTER_WALL_COLOR
     if "wall" in obstacle.name:

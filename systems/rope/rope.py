@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from systems.drawing.shapes import Shape
 from systems.rope.band.band import bands_close, reduce_rope, reduced_dim
 from systems.rope.band.propagation_kernels import propagate_bands
+from systems.rope.drawing import drawn_band, drawn_rope, drawn_scene
 from systems.rope.features.registry import FEATURE_NAMES, FEATURES
 from systems.rope.gripper_kernels import allowed_moves, steer_grippers
 from systems.rope.paper_scenes import SCENE_NAMES, load_scene
@@ -83,6 +85,7 @@ class Rope(System):
     configuration_dim = 6
     step_size = STEP_SIZE
     independent_parts = (slice(0, 3), slice(3, 6))
+    view_from = (-0.5, -0.9, 0.55)
 
     def __init__(
         self,
@@ -216,6 +219,22 @@ class Rope(System):
             of 13: see :func:`systems.rope.features.vector.vector_features`.
         """
         return FEATURES[self.feature_kind](reduced, next_reduced, self.scene)
+
+    def draw(self, reduced: Array) -> list[Shape]:
+        """Return the band and the grippers at its ends."""
+        return drawn_band(np.reshape(reduced[6 : self._band_dim], (-1, 3)))
+
+    def draw_state(self, state: RopeState) -> list[Shape]:
+        """Return the true rope and its grippers."""
+        return drawn_rope(state.nodes, state.grippers)
+
+    def draw_scene(self) -> list[Shape]:
+        """Return the obstacles."""
+        return drawn_scene(self.scene)
+
+    def traced_points(self, configurations: Array) -> Array:
+        """Return the positions of both grippers."""
+        return np.reshape(configurations, (-1, 2, 3))
 
     def scene_problem(self) -> Problem:
         """Return the scene's own start, at rest, and its goal."""

@@ -1,0 +1,1 @@
+"""Plans in motion, in the browser and in HTML files."""

@@ -1,0 +1,1 @@
+"""How systems look: shapes as plain data, which any viewer can show."""
