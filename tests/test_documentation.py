@@ -10,6 +10,7 @@ import types
 from enum import Enum
 from pathlib import Path
 
+import numpy as np
 import pytest
 from sklearn.linear_model import LogisticRegression
 from toy_systems import Disc
@@ -18,6 +19,7 @@ import planners
 import reliability
 import systems
 from planners import BiasedRRTConnect
+from planners.viewer.arguments import make_show
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = (systems, reliability, planners)
@@ -39,6 +41,7 @@ PAGES = sorted((ROOT / "docs").glob("*.md"))
         "planners.rrt",
         "planners.rrt_connect",
         "systems.goal_region",
+        "planners.viewer.viewer",
     ],
 )
 def test_docstring_examples_run(module):
@@ -105,6 +108,20 @@ def test_the_page_on_what_did_not_help_can_be_followed(tmp_path, monkeypatch, ca
     assert plan.calibrated_probability is not None
 
 
+def test_the_viewers_page_draws_the_point_as_written():
+    page = (ROOT / "docs" / "viewer.md").read_text()
+    first, drawn = re.findall(r"```python\n(.*?)```", page, flags=re.S)
+    names = {"planners": planners, "np": np, "WindyPoint": Disc}
+    exec(compile(first[: first.index("\nshow(")], "viewer.md", "exec"), names)
+    assert names["plan"].solved
+    exec(compile(drawn, "viewer.md", "exec"), names)
+    point, goal = names["DrawnPoint"](), np.array([[0.9, 0.2]])
+    plan = BiasedRRTConnect(point, random_state=0).plan([-0.9, 0.0], goal)
+    (panel,) = make_show(point, plan, None, goal, None).panels
+    assert len(panel.tree)
+    assert len(panel.scene) == len(panel.planned[0]) == 1
+
+
 @pytest.mark.parametrize(
     "document",
     [
@@ -119,6 +136,7 @@ def test_the_page_on_what_did_not_help_can_be_followed(tmp_path, monkeypatch, ca
         "docs/messages.md",
         "docs/plan_worth.md",
         "docs/rope_contacts.md",
+        "docs/viewer.md",
         "examples/README.md",
     ],
 )
@@ -172,6 +190,7 @@ def test_every_public_name_documents_what_it_takes(thing):
         (
             "mujoco",
             {
+                "systems/drawing/mujoco_shapes.py",
                 "systems/features/holding_load.py",
                 "systems/features/mujoco_models.py",
                 "systems/features/mujoco_obstacles.py",
@@ -211,6 +230,7 @@ def test_every_public_name_documents_what_it_takes(thing):
             "ompl",
             {"planners/ompl_backend.py", "planners/ompl_globals.py", "planners/ompl_planner.py"},
         ),
+        ("viser", {"planners/viewer/stage.py"}),
     ],
 )
 def test_heavy_libraries_have_one_home(library, allowed):

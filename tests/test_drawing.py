@@ -47,10 +47,8 @@ def test_mujoco_geoms_are_where_the_joints_put_them():
     np.testing.assert_allclose(np.abs(capsule.points - [1, 0, 0]), [[0.5, 0, 0]] * 2, atol=1e-12)
     np.testing.assert_allclose(np.abs(ellipsoid.vertices).max(axis=0), [0.1, 0.2, 0.3], rtol=0.01)
     assert isinstance(mesh, MeshShape)
-    assert (
-        np.linalg.norm(mesh.vertices @ mesh.rotation.T + mesh.position - [1, 0, 1], axis=1).min()
-        < 1e-6
-    )
+    corners = mesh.vertices @ mesh.rotation.T + mesh.position
+    assert np.linalg.norm(corners - [1, 0, 1], axis=1).min() < 1e-6
     assert isinstance(cylinder, CylinderShape)
     (plane,) = mujoco_shapes(model, data, moving=False)
     np.testing.assert_allclose(plane.position[2] + plane.half_extents[2], -1)

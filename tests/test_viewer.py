@@ -145,7 +145,8 @@ def test_the_camera_sees_everything(n_plans):
     up = np.cross(right / np.linalg.norm(right), forward)
     for offset in layout.offsets:
         for x, y in np.ndindex(2, 2):
-            gap = offset + [2 * x - 1, 2 * y - 1, -0.3] - layout.camera
+            corner = np.array([2 * x - 1, 2 * y - 1, -0.3])
+            gap = corner + offset - layout.camera
             assert 0 < abs(gap @ up) < np.tan(FIELD_OF_VIEW / 2) * (gap @ forward)
 
 

@@ -23,8 +23,8 @@ from systems.drawing.shapes import Shape
 from systems.goal_region import GoalRegion
 from systems.system import Array, Rollout, System
 
-# A browser draws so many lines smoothly; of larger trees an even choice is shown.
-MOST_TREE_LINES = 20_000
+# Any browser draws so many lines smoothly; of larger trees an even choice is shown.
+MOST_TREE_LINES = 5_000
 # States within a command that are looked at; more are not told apart.
 _MOST_MOMENTS = 13
 _BESIDE_EXECUTION = 0.4
