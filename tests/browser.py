@@ -3,6 +3,7 @@
 import contextlib
 import io
 import os
+import re
 import shutil
 
 import numpy as np
@@ -52,7 +53,7 @@ class Page:
 
     def __init__(self, browser, url):
         self.errors, self.requests = [], []
-        self.page = browser.new_page(viewport={"width": 560, "height": 420})
+        self.page = browser.new_page(viewport={"width": 760, "height": 420})
         self.page.set_default_timeout(PATIENCE)
         self.page.on("console", lambda m: m.type == "error" and self.errors.append(m.text))
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
@@ -73,7 +74,8 @@ class Page:
 
     def slider_number(self):
         """Return the number beside the slider."""
-        return float(self.page.evaluate("document.querySelector('input').value"))
+        values = self.page.evaluate("[...document.querySelectorAll('input')].map(i => i.value)")
+        return float(next(value for value in values if re.fullmatch(r"[\d.]+", value)))
 
     def picture(self):
         """Return the scene as it stands still, as an array of shape (height, width, 3)."""

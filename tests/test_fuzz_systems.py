@@ -20,16 +20,21 @@ from fuzzing import (
 
 from systems import (
     Box,
+    BoxShape,
     Capsule,
     Car,
     CarScene,
     Circle,
     ConvexPolygon,
     Cylinder,
+    CylinderShape,
+    MeshShape,
     PlanarArm,
     Rope,
     RopeState,
     Scene,
+    SphereShape,
+    TubeShape,
     check_system,
     directions,
     from_body_frame,
@@ -203,6 +208,34 @@ DOORS = {
         start=rows(3),
         end=rows(3),
         radius=numbers,
+    ),
+    "SphereShape": made(
+        SphereShape, {"position": np.zeros(3), "radius": 0.5}, position=rows(3), radius=numbers
+    ),
+    "BoxShape": made(
+        BoxShape,
+        {"position": np.zeros(3), "half_extents": np.ones(3), "rotation": np.eye(3)},
+        position=rows(3),
+        half_extents=rows(3),
+        rotation=rows(3, 3),
+    ),
+    "CylinderShape": made(
+        CylinderShape,
+        {"position": np.zeros(3), "radius": 0.5, "half_length": 1.0, "rotation": np.eye(3)},
+        position=rows(3),
+        radius=numbers,
+        half_length=numbers,
+        rotation=rows(3, 3),
+    ),
+    "TubeShape": made(
+        TubeShape, {"points": np.eye(3), "radius": 0.5}, points=rows(3, 3), radius=numbers
+    ),
+    "MeshShape": made(
+        MeshShape,
+        {"vertices": np.eye(3), "faces": np.array([[0, 1, 2]]), "position": np.zeros(3)},
+        vertices=rows(3, 3),
+        faces=rows(1, 3),
+        position=rows(3),
     ),
     "Circle": made(
         lambda **given: Circle(**given).outline,

@@ -1,6 +1,7 @@
 """The viewer's pages in a real browser, where viser, playwright and Chromium are installed."""
 
 import re
+import signal
 import socket
 import subprocess
 import sys
@@ -74,16 +75,19 @@ def test_a_viewer_does_not_block_and_closes_cleanly(capsys):
 
 def test_a_script_waits_for_ctrl_c_and_then_goes_on():
     code = f"""
-import _thread, threading, sys
+import sys
 sys.path[:0] = {sys.path!r}
 from test_viewer_pages import DISC, PLAN
 from planners import show
-threading.Timer(2, _thread.interrupt_main).start()
 viewer = show(DISC, PLAN)
 print("went on", viewer)
 """
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
-    assert "went on <Viewer of 1 plans: closed>" in ran.stdout, ran.stderr
+    with subprocess.Popen([sys.executable, "-uc", code], stdout=subprocess.PIPE, text=True) as ran:
+        assert ran.stdout.readline().startswith("Open http://127.0.0.1")
+        with pytest.raises(subprocess.TimeoutExpired):
+            ran.wait(2)
+        ran.send_signal(signal.SIGINT)
+        assert ran.stdout.read() == "went on <Viewer of 1 plans: closed>\n"
     assert ran.returncode == 0
 
 
@@ -95,15 +99,15 @@ def test_the_live_page_moves_the_robot_and_plays(browser):
         page.click_slider(0.8)
         later = page.picture()
         assert page.slider_number() > 0.5 * len(PLAN.commands)
-        assert share_that_differs(first[:, :200], later[:, :200]) > 0.002
+        assert share_that_differs(first[:, :380], later[:, :380]) > 0.002
         page.click_slider(0.0)
-        assert share_that_differs(first[:, :200], page.picture()[:, :200]) < 0.0005
+        assert share_that_differs(first[:, :380], page.picture()[:, :380]) < 0.0005
         page.page.get_by_role("button", name="Play").click()
         page.page.get_by_role("button", name="Pause").wait_for()
         page.page.get_by_role("button", name="Play").wait_for()
         assert page.slider_number() == len(PLAN.commands)
         before = page.picture()
-        page.page.get_by_label("search tree").uncheck(force=True)
+        page.page.evaluate("document.querySelector('input[type=checkbox]').click()")
         assert share_that_differs(before, page.picture()) > 0.001
     assert page.errors == []
     assert all(re.match(r"(data|blob:)?.*127\.0\.0\.1|data:", url) for url in page.requests)
@@ -135,5 +139,5 @@ def test_paths_have_the_colours_of_the_legend(browser, tmp_path):
     expected = np.array(
         [int(css(reliability_colors(np.array([0.95]))[0])[i : i + 2], 16) for i in (1, 3, 5)]
     )
-    near = np.abs(pixels[100:-45] - expected).max(axis=2) < 12
+    near = np.abs(pixels[100:-45] - expected).max(axis=2) < 25
     assert near.sum() > 100

@@ -31,7 +31,7 @@ def shapes_between(one: Sequence[Shape], other: Sequence[Shape], share: float) -
     return [_between(a, b, share) for a, b in zip(one, other, strict=True)]
 
 
-def _between(one: Shape, other: Any, share: float) -> Shape:
+def _between(one: Any, other: Any, share: float) -> Shape:
     if type(one) is not type(other):
         return one
     if isinstance(one, TubeShape):

@@ -153,7 +153,9 @@ class Viewer:
 
     def _add_controls(self) -> None:
         gui, show = self._server.gui, self._show
-        gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
+        gui.configure_theme(show_logo=False, show_share_button=False)
+        # At the right edge, the controls hide nothing of the scene.
+        gui.main_panel.dock_right()
         gui.set_panel_label("Plans")
         self._slider = gui.add_slider(
             "transition",
@@ -168,7 +170,7 @@ class Viewer:
         self._button.on_click(lambda _: self._pause() if self._playing.is_set() else self._start())
         for part, label in PARTS.items():
             self._add_checkbox(part, label)
-        gui.add_html(caption_html(show.panels))
+        gui.add_html(f'<div style="padding:6px 10px">{caption_html(show.panels)}</div>')
 
     def _add_checkbox(self, part: str, label: str) -> None:
         box = self._server.gui.add_checkbox(label, initial_value=True)

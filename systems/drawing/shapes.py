@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.validation import as_any_array, as_finite_array, check_number, is_number
+from systems.validation import as_any_array, as_finite_array, is_number
 
 Array = NDArray[np.float64]
 Color = tuple[float, float, float, float]
@@ -237,10 +237,13 @@ def _set_rotation(shape: BoxShape | CylinderShape | MeshShape) -> None:
 
 def _check_size(shape: Shape, name: str) -> None:
     value = getattr(shape, name)
-    label = f"{type(shape).__name__}.{name}"
-    check_number(value, label, 0, _MOST_METRES)
-    if value == 0:
-        raise ValueError(f"{label} must be positive, got {value!r}.")
+    # Comparing with a float16 makes the limit float16 too, for which it is too large.
+    plain = value.item() if isinstance(value, np.generic) else value
+    if not is_number(plain) or not 0 < plain <= _MOST_METRES:
+        raise ValueError(
+            f"{type(shape).__name__}.{name} must be positive and at most {_MOST_METRES:g} m, got "
+            f"{value!r}."
+        )
 
 
 def _check_color(shape: Shape) -> None:
