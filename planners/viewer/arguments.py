@@ -44,7 +44,9 @@ class Show:
         return self.n_transitions * self.frames_per_transition + 1
 
 
-def make_show(system: Any, plans: Any, executed: Any, goal: Any, names: Any) -> Show:
+def make_show(
+    system: Any, plans: Any, executed: Any, goal: Any, names: Any, width_per_height: float = 1.2
+) -> Show:
     """Check the arguments of :func:`planners.show` and draw everything, as plain data."""
     plans = _as_list(plans, "plans", PlanResult | Execution)
     systems = _as_list(system, "system", System, len(plans))
@@ -60,7 +62,7 @@ def make_show(system: Any, plans: Any, executed: Any, goal: Any, names: Any) -> 
     per_transition = math.ceil(_SMOOTH / max(n_transitions, 1))
     per_transition = min(per_transition, _MOST_PER_TRANSITION)
     panels = [sketch.finish(n_transitions, per_transition) for sketch in sketches]
-    layout = lay_out(panels, systems[0].view_from)
+    layout = lay_out(panels, systems[0].view_from, width_per_height)
     return Show(panels, n_transitions, per_transition, layout)
 
 

@@ -14,6 +14,8 @@ from systems.validation import as_path
 
 # A server has to be there while its scene is recorded; viser takes the next port that is free.
 _ANY_PORT = 18080
+# Frames in documents are wide.
+_WIDTH_PER_HEIGHT = 1.7
 # Seconds that the end is shown before the motion begins again.
 _PAUSE_AT_END = 1.5
 # viser fills its element of the page, which leaves room for the caption above it.
@@ -59,7 +61,7 @@ def export_html(
         If the file can't be written.
     """
     file = as_path(path)
-    show = make_show(system, plans, executed, goal, names)
+    show = make_show(system, plans, executed, goal, names, _WIDTH_PER_HEIGHT)
     put(file, _recorded(show).encode())
 
 

@@ -13,8 +13,6 @@ from systems.drawing.shapes import BoxShape, CylinderShape, MeshShape, Shape, Sp
 from systems.system import Array
 
 FIELD_OF_VIEW = math.radians(35)
-# Windows are wider than high; the control panel or the legend covers some of their width.
-_WIDTH_PER_HEIGHT = 1.7
 _GAP = 1.08
 _MARGIN = 1.06
 _MOST_IN_ONE_ROW = 3
@@ -43,8 +41,16 @@ class Layout:
     size: float
 
 
-def lay_out(panels: Sequence[Panel], view_from: Sequence[float]) -> Layout:
-    """Set panels side by side, as seen from a direction, and the camera so that it sees all."""
+def lay_out(panels: Sequence[Panel], view_from: Sequence[float], width_per_height: float) -> Layout:
+    """Set panels side by side, as seen from a direction, and the camera so that it sees all.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+    view_from : sequence of three floats
+    width_per_height : float
+        Of the part of the window in which the scene is shown; in narrower ones it is cut off.
+    """
     right, up, towards = axes = _camera_axes(view_from)
     clouds = [_corners(panel) for panel in panels]
     seen = np.array(
@@ -59,7 +65,7 @@ def lay_out(panels: Sequence[Panel], view_from: Sequence[float]) -> Layout:
     everything = np.concatenate(
         [cloud + offset for cloud, offset in zip(clouds, offsets, strict=True)]
     )
-    camera, look_at = _camera(everything @ axes.T, axes)
+    camera, look_at = _camera(everything @ axes.T, axes, width_per_height)
     size = float(np.linalg.norm(np.ptp(np.concatenate(clouds), axis=0)))
     return Layout(offsets, labels, camera, look_at, max(size, _LEAST_EXTENT))
 
@@ -74,14 +80,14 @@ def _camera_axes(view_from: Sequence[float]) -> Array:
     return np.array([right, np.cross(towards, right), towards])
 
 
-def _camera(seen: Array, axes: Array) -> tuple[Array, Array]:
+def _camera(seen: Array, axes: Array, width_per_height: float) -> tuple[Array, Array]:
     """Return the nearest place from which points, (n, 3) in camera axes, are in sight."""
     low, high = seen.min(axis=0), seen.max(axis=0)
     middle = (low + high) / 2
     vertical = math.tan(FIELD_OF_VIEW / 2) / _MARGIN
     x, y, z = (seen - middle).T
     distance = np.max(
-        z + np.maximum(np.abs(x) / (vertical * _WIDTH_PER_HEIGHT), np.abs(y) / vertical)
+        z + np.maximum(np.abs(x) / (vertical * width_per_height), np.abs(y) / vertical)
     )
     look_at = middle @ axes
     return look_at + max(float(distance), _LEAST_EXTENT) * axes[2], look_at
