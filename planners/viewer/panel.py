@@ -27,7 +27,7 @@ from systems.system import Array, Rollout, System
 MOST_TREE_LINES = 5_000
 # States within a command that are looked at; more are not told apart.
 _MOST_MOMENTS = 13
-_BESIDE_EXECUTION = 0.4
+_BESIDE_EXECUTION = 0.5
 
 
 @dataclass(frozen=True, eq=False)

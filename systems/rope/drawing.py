@@ -10,7 +10,7 @@ from systems.rope.renderer import BAND_COLOR, GRIPPER_COLOR, ROPE_COLOR, obstacl
 from systems.rope.scene import GRIPPER_RADIUS, ROPE_RADIUS, Scene
 
 # The band has no thickness; thinner than the rope, it does not hide it.
-_BAND_RADIUS = 0.6 * ROPE_RADIUS
+_BAND_RADIUS = 0.8 * ROPE_RADIUS
 
 
 def drawn_scene(scene: Scene) -> list[Shape]:
