@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from systems.extras import needing
+
 _TREE, _PLAN = "0.7", "0.35"
 _COLORS = "RdYlBu"
 
@@ -13,7 +15,8 @@ _COLORS = "RdYlBu"
 def draw_plan(plan: Any, axes: Any = None) -> Any:
     """Draw a plan; see :meth:`PlanResult.plot`."""
     if axes is None:
-        import matplotlib.pyplot as plt
+        with needing("examples", "PlanResult.plot"):
+            import matplotlib.pyplot as plt
 
         _, axes = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
     _draw_tree(plan, axes[0])

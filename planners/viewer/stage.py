@@ -14,6 +14,7 @@ from planners.viewer.layout import FIELD_OF_VIEW, Layout
 from planners.viewer.nodes import ShapeNodes, add_lines
 from planners.viewer.panel import Panel
 from systems.drawing.shapes import Shape, SphereShape
+from systems.extras import needing
 from systems.system import Array
 
 # What can be shown and hidden, by the name of its part of the scene.
@@ -37,12 +38,8 @@ def start_server(port: int) -> Any:
     ImportError
         If viser is not installed.
     """
-    try:
+    with needing("viewer", "The viewer"):
         import viser
-    except ImportError as error:
-        raise ImportError(
-            "The viewer needs viser: install transition-reliability[viewer]."
-        ) from error
     with quiet():
         return viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
 
