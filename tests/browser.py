@@ -79,14 +79,17 @@ class Page:
 
     def picture(self):
         """Return the scene as it stands still, as an array of shape (height, width, 3)."""
-        before = self._canvas()
-        for _ in range(40):
-            self.page.wait_for_timeout(400)
-            now = self._canvas()
-            if np.array_equal(now, before):
-                return now
-            before = now
+        pictures = []
+        for _ in range(60):
+            self.page.wait_for_timeout(500)
+            pictures = [*pictures[-2:], self._canvas()]
+            if len(pictures) == 3 and all(np.array_equal(pictures[0], one) for one in pictures):
+                return pictures[0]
         raise AssertionError("the scene does not come to rest")
+
+    def comes_back_to(self, picture, part):
+        """Say whether a part of the page comes to look as it does in a picture."""
+        return any(share_that_differs(picture[part], self.picture()[part]) < 5e-4 for _ in range(8))
 
     def _canvas(self):
         import matplotlib.image
