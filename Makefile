@@ -54,7 +54,7 @@ docs: $(ENV)/ready-for-docs ## these pages, in build/docs/html
 	GALLERY="$(GALLERY)" $(RUN) -m sphinx -b html --fail-on-warning --keep-going \
 		-d build/docs/doctrees docs build/docs/html
 
-bench: $(ENV)/ready ## ratios behind the README's claims
+bench: $(ENV)/ready ## ratios of speed, as in docs/performance.md
 	$(RUN) -m benchmarks.speed.arm
 
 env: $(ENV)/ready

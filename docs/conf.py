@@ -76,6 +76,8 @@ html_theme = "pydata_sphinx_theme"
 html_static_path = ["_static"]
 html_css_files = ["pages.css"]
 html_title = project
+# Pages without pages below them have nothing to show at the side.
+html_sidebars = {page: [] for page in ("index", "install", "tutorial", "concepts")}
 html_theme_options = {
     "show_toc_level": 2,
     "navigation_with_keys": False,

@@ -155,8 +155,8 @@ def test_classes_that_pages_mention_have_what_is_said():
     }
     assert len(found) > 10
     for owner, attribute in found:
-        fields = getattr(public[owner], "__dataclass_fields__", {})
-        assert hasattr(public[owner], attribute) or attribute in fields, f"{owner}.{attribute}"
+        documented = re.search(rf"^{attribute}\b", inspect.getdoc(public[owner]), flags=re.M)
+        assert hasattr(public[owner], attribute) or documented, f"{owner}.{attribute}"
 
 
 PUBLIC = [
