@@ -33,7 +33,7 @@ GROUPS = {
         "FastHistGradientBoostingClassifier compile_inference BaseRateWarning",
         "Learning in rounds": "learn_in_rounds LearningResult RoundReport",
         "Judging": "diagnose Diagnosis compare_features FeatureComparison",
-        "Files": "save_estimator load_estimator ModelFileError",
+        "Files": "load_pretrained save_estimator load_estimator ModelFileError",
         "Resumable work": "ResumableStore run_jobs Job Item StoreError describe code_digest",
     },
     "planners": {
