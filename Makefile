@@ -1,4 +1,4 @@
-# Verbs: arm, rope, car, test, check, bench, env, clean; test-lowest, test-newest, test-sdist, test-matrix.
+# Verbs: arm, rope, car, test, check, bench, docs, env, clean; test-lowest, test-newest, test-sdist, test-matrix.
 PYTHON ?= python3.11
 ENV := .venv
 RUN := $(ENV)/bin/python
@@ -49,7 +49,12 @@ check: $(ENV)/ready
 	$(RUN) -m ruff format --check .
 	$(RUN) -m mypy
 
-bench: $(ENV)/ready ## ratios behind the README's claims
+# GALLERY=none runs no examples, GALLERY=car only those whose names hold "car".
+docs: $(ENV)/ready-for-docs ## these pages, in build/docs/html
+	GALLERY="$(GALLERY)" $(RUN) -m sphinx -b html --fail-on-warning --keep-going \
+		-d build/docs/doctrees docs build/docs/html
+
+bench: $(ENV)/ready ## ratios of speed, as in docs/performance.md
 	$(RUN) -m benchmarks.speed.arm
 
 env: $(ENV)/ready
@@ -59,7 +64,11 @@ $(ENV)/ready: setup.cfg pyproject.toml constraints.txt
 	$(RUN) -m pip install --quiet --constraint constraints.txt --editable ".[all,test]"
 	touch $@
 
-clean:
-	rm -rf $(ENV) .venv-newest $(LOWEST) build *.egg-info
+$(ENV)/ready-for-docs: $(ENV)/ready
+	$(RUN) -m pip install --quiet --constraint constraints.txt --editable ".[docs]"
+	touch $@
 
-.PHONY: arm rope car test test-lowest test-newest test-sdist test-matrix check bench env clean
+clean:
+	rm -rf $(ENV) .venv-newest $(LOWEST) build docs/api docs/gallery *.egg-info
+
+.PHONY: arm rope car test test-lowest test-newest test-sdist test-matrix check docs bench env clean

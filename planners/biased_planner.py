@@ -30,6 +30,7 @@ from planners.search import Found, Search
 from planners.shortcutting import shorten
 from planners.shortcutting_repropagated import RepropagatedShortcuts
 from planners.success_calibration import SuccessCalibration
+from reliability.documentation_link import DocumentationLink
 from systems.goal_region import GoalRegion
 from systems.system import System
 from systems.validation import (
@@ -49,7 +50,7 @@ _FOR_ROBUSTNESS = (2**32 - 1,)
 
 
 @dataclass(eq=False, repr=False)
-class BiasedPlanner(BaseEstimator):
+class BiasedPlanner(DocumentationLink, BaseEstimator):
     """Base of the biased planners, which document the parameters.
 
     Constructors only store; :meth:`plan` validates.

@@ -16,6 +16,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from planners.check_transition import negative_log_likelihood
 from planners.result import PlanResult
+from reliability.documentation_link import DocumentationLink
 from systems.system import Array
 from systems.validation import as_numbers, check_number
 
@@ -29,7 +30,7 @@ LEAST_COST = 1e-4
 N_EXPECTATIONS = 20
 
 
-class SuccessCalibration(BaseEstimator):
+class SuccessCalibration(DocumentationLink, BaseEstimator):
     """Turns the reliabilities of a plan's transitions into the probability that the plan goes well.
 
     The product of the reliabilities is that probability only if transitions fail independently of

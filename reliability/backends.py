@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator
 
+from reliability.documentation_link import DocumentationLink
 from reliability.networks.hyperparameters import Hyperparameters, as_plain
 from reliability.networks.mlp_inference import MLPInference
 from reliability.networks.voxel_format import check_pooling, grid_shape
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from reliability.networks.batches import LabelledRows
 
 
-class Backend(BaseEstimator, ABC):
+class Backend(DocumentationLink, BaseEstimator, ABC):
     """A kind of network: its own parameters, and how it is trained unless the user says otherwise.
 
     Torch is imported when a module is built and not before.

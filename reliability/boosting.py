@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.utils.metaestimators import available_if
 
+from reliability.documentation_link import DocumentationLink
 from reliability.fast_inference.compiling import compile_inference
 
 
@@ -16,7 +17,7 @@ def _can_be_compiled(classifier: FastHistGradientBoostingClassifier) -> bool:
     return compile_inference(classifier) is not None
 
 
-class FastHistGradientBoostingClassifier(HistGradientBoostingClassifier):
+class FastHistGradientBoostingClassifier(DocumentationLink, HistGradientBoostingClassifier):
     """scikit-learn's ``HistGradientBoostingClassifier`` and a method for a few rows at a time.
 
     Parameters, attributes and all answers are scikit-learn's. Planners compile

@@ -16,6 +16,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from reliability.backends import Backend, as_backend
 from reliability.base_rate import warn_if_no_better_than_base_rate, weighted_share
 from reliability.calibration_curve import CalibrationCurve
+from reliability.documentation_link import DocumentationLink
 from reliability.fit_callbacks import CallbackSupportMixin, FitTasks
 from reliability.model_files import ModelFileError
 from reliability.networks.constant_inference import ConstantInference
@@ -40,7 +41,9 @@ STAMPED_PACKAGES = ("numpy", "scikit-learn", "skorch", "torch")
 _ROWS_AT_ONCE = 16384
 
 
-class TransitionReliabilityClassifier(CallbackSupportMixin, ClassifierMixin, BaseEstimator):
+class TransitionReliabilityClassifier(
+    DocumentationLink, CallbackSupportMixin, ClassifierMixin, BaseEstimator
+):
     """Predict whether a transition of the reduced model is reliable.
 
     A neural network that is trained on labelled transitions, with two classes. Part of the plans is

@@ -93,9 +93,9 @@ class Car(System):
     >>> import numpy as np
     >>> from systems import Car
     >>> car = Car("slalom")
-    >>> forwards = np.array([[0.5, 0.0, 0.0]])
+    >>> forwards = np.array([[0.5, 0.0, 0.0]] * 2)
     >>> slow, fast = car.execute([[0.6, 3, 0, 0.2, 0], [0.6, 3, 0, 2.5, 0]], forwards)[0]
-    >>> slow[3] < fast[3]
+    >>> bool(slow[3] < fast[3])
     True
     """
 
