@@ -70,16 +70,7 @@ def read_arrays(
         found = int(arrays[_VERSION])
     except FileNotFoundError:
         raise
-    except (
-        zipfile.BadZipFile,
-        KeyError,
-        EOFError,
-        OSError,
-        AttributeError,
-        NotImplementedError,
-        TypeError,
-        ValueError,
-    ) as error:
+    except Exception as error:  # Damage shows in each layer: zip, deflate, header, array.
         raise ValueError(f"{path} is not a whole file of {kind} ({error}).") from error
     if found != format_version:
         raise ValueError(
@@ -104,18 +95,43 @@ def _read_all(path: Path) -> dict[str, NDArray[Any]]:
         if sum(entry.file_size for entry in entries) > size:
             raise ValueError(f"its arrays would be larger than the file's {size} bytes")
         return {
-            entry.filename.removesuffix(".npy"): _read_array(archive.read(entry), entry.filename)
+            entry.filename.removesuffix(".npy"): read_array(
+                read_entry(archive, entry), entry.filename
+            )
             for entry in entries
         }
 
 
-def _read_array(content: bytes, name: str) -> NDArray[Any]:
+def read_entry(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> bytes:
+    """Read one file of an archive, of which no more is unpacked than it claims to hold.
+
+    Raises
+    ------
+    ValueError
+        If it holds more or less, or is packed in a way that can't be unpacked by parts.
+    """
+    if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise ValueError(f"{entry.filename} is packed in an unknown way")
+    with archive.open(entry) as stream:
+        content = stream.read(entry.file_size)
+        if len(content) != entry.file_size or stream.read(1):
+            raise ValueError(f"{entry.filename} does not hold {entry.file_size} bytes")
+    return content
+
+
+def read_array(content: bytes, name: str) -> NDArray[Any]:
+    """Return the array of an npy file, if it is as large as it claims and holds no objects.
+
+    Raises
+    ------
+    ValueError
+    """
     stream = io.BytesIO(content)
     version = npy.read_magic(stream)
     read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
     shape, _, dtype = read_header(stream)
     n_bytes = math.prod(shape) * dtype.itemsize
-    if n_bytes != len(content) - stream.tell():
+    if n_bytes != len(content) - stream.tell() or not dtype.itemsize:
         raise ValueError(f"{name} claims to hold {n_bytes} bytes and does not")
     stream.seek(0)
     return npy.read_array(stream, allow_pickle=False)

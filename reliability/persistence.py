@@ -9,8 +9,9 @@ from typing import Any
 import joblib
 import sklearn
 
+from reliability.item_files import put
 from reliability.model_checks import check_model
-from reliability.model_files import ModelFileError, read_model, write_model
+from reliability.model_files import ModelFileError, model_file, read_model
 from systems.extras import needing
 from systems.validation import as_path
 
@@ -49,8 +50,9 @@ def save_estimator(estimator: Any, path: str | os.PathLike[str]) -> None:
     path = as_path(path)
     if path.suffix != SKOPS:
         raise ValueError(f"path must end in {SKOPS}, got {os.fspath(path)!r}.")
+    content = model_file(estimator)
     check_model(estimator)
-    write_model(path, estimator)
+    put(path, content)
 
 
 def load_estimator(path: str | os.PathLike[str]) -> Any:

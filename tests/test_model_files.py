@@ -31,7 +31,7 @@ from reliability import (
     load_estimator,
     save_estimator,
 )
-from reliability.model_files import sealed, write_model
+from reliability.model_files import model_file, sealed
 
 X = np.random.default_rng(0).normal(size=(300, 4))
 y = (X[:, 0] + X[:, 1] > 0).astype(int)
@@ -94,7 +94,7 @@ def test_one_label_is_kept(tmp_path):
     ("make", "words"),
     [
         (lambda: SVC().fit(X, y), "sklearn.svm._classes.SVC.*joblib.dump"),
-        (lambda: KNeighborsClassifier().fit(X, y), "KDTree.*joblib.dump"),
+        (lambda: KNeighborsClassifier().fit(X, y), "KNeighborsClassifier.*joblib.dump"),
         (
             lambda: TransitionReliabilityClassifier(TwoLayers, max_epochs=1).fit(X, y),
             "own_modules.TwoLayers.*joblib.dump",
@@ -193,7 +193,7 @@ def splits_by_a_category(model):
 def test_boosting_that_was_tampered_with_is_refused(harm, tmp_path):
     model = fitted("boosting")
     harm(model)
-    write_model(tmp_path / "model.skops", model)
+    (tmp_path / "model.skops").write_bytes(model_file(model))
     with pytest.raises(ModelFileError, match=r"model\.skops can't be used"):
         load_estimator(tmp_path / "model.skops")
 
@@ -211,7 +211,7 @@ def test_a_network_that_was_tampered_with_is_refused(harm, tmp_path):
         inference.weights[first] = inference.weights[first].astype(np.float64)
     else:
         model.n_features_in_ = 3
-    write_model(tmp_path / "model.skops", model)
+    (tmp_path / "model.skops").write_bytes(model_file(model))
     with pytest.raises(ModelFileError, match="the weights"):
         load_estimator(tmp_path / "model.skops")
 
@@ -227,7 +227,7 @@ def test_a_forest_that_was_tampered_with_is_refused(field, value, wrapped, tmp_p
     state = tree.__getstate__()
     state["nodes"][field][0] = value
     tree.__setstate__(state)
-    write_model(tmp_path / "model.skops", model)
+    (tmp_path / "model.skops").write_bytes(model_file(model))
     with pytest.raises(ModelFileError, match="a node of a tree refers to"):
         load_estimator(tmp_path / "model.skops")
 
@@ -235,7 +235,7 @@ def test_a_forest_that_was_tampered_with_is_refused(field, value, wrapped, tmp_p
 def test_a_tree_that_looks_beyond_the_rows_of_its_forest_is_refused(tmp_path):
     model = fitted("forest")
     model.n_features_in_ = 1
-    write_model(tmp_path / "model.skops", model)
+    (tmp_path / "model.skops").write_bytes(model_file(model))
     with pytest.raises(ModelFileError, match="a node of a tree refers to"):
         load_estimator(tmp_path / "model.skops")
 

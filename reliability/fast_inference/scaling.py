@@ -45,6 +45,7 @@ def compile_scaler(scaler: Any) -> Transform | None:
     casts = _casts_parameters(kind)
     if casts is None:
         return None
+    check_scaler(scaler)
     double = _scaling(scaler)
     single = _cast(double) if casts else double
     name, n_features = kind.__name__, scaler.n_features_in_
@@ -61,6 +62,19 @@ def compile_scaler(scaler: Any) -> Transform | None:
         return scaled
 
     return transform
+
+
+def check_scaler(scaler: Any) -> None:
+    """Raise ``ValueError`` unless a fitted scaler has one number for each feature, if any.
+
+    Parameters
+    ----------
+    scaler : StandardScaler, MinMaxScaler, RobustScaler or MaxAbsScaler
+    """
+    name, n_features = type(scaler).__name__, scaler.n_features_in_
+    for array in _scaling(scaler)[:4]:
+        if np.shape(array) != (n_features,) or np.asarray(array).dtype.kind != "f":
+            raise ValueError(f"{name} is damaged: it has not one number for each feature.")
 
 
 @cache
