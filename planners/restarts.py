@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from planners.result import PlanResult
-from systems.validation import check_count, check_number
+from systems.validation import check_count, check_number, is_number
 
 _COSTS = (
     "planning_time",
@@ -51,7 +51,7 @@ def best_of_restarts(
     Raises
     ------
     ValueError
-        If ``n_plans`` is no positive integer or ``enough`` is no number.
+        If ``n_plans`` is no positive integer, ``enough`` is no number, or ``score`` returns none.
     """
     check_count(n_plans, "n_plans")
     check_number(enough, "enough", -np.inf, np.inf)
@@ -67,6 +67,8 @@ def best_until_enough(
     for plan in plans:
         made.append(plan)
         scored = score(plan) if plan.solved else np.nan
+        if not is_number(scored):
+            raise ValueError(f"score must return a number, got {scored!r}.")
         scores.append(-np.inf if np.isnan(scored) else scored)
         if scores[-1] >= enough:
             break

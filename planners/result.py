@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from planners.result_plot import draw_plan
 from reliability.archive import read_arrays, write_arrays
-from systems.validation import as_finite_array, as_numbers, is_integer
+from systems.validation import as_finite_array, as_numbers, check_number, is_integer
 
 FORMAT_VERSION = 2
 Array = NDArray[np.float64]
 # Left out of a file where they are None.
 _MAY_BE_NONE = frozenset({"reliability", "calibrated_probability", "robustness"})
 _ARRAYS = frozenset({"reduced", "commands", "tree", "reliability"})
+_COUNTS = ("n_checked", "n_rejected", "n_accepted_unreliable")
 
 
 class PlanStatus(Enum):
@@ -135,18 +136,17 @@ class PlanResult:
         Raises
         ------
         ValueError
-            If this is not a whole plan: arrays of numbers that go together, and a seed.
+            If this is not a whole plan: arrays of numbers that go together, counts, times,
+            probabilities, and a seed.
         """
-        if not is_integer(self.random_state):
-            raise ValueError(f"random_state must be an integer, got {self.random_state!r}.")
         values: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
-        values["status"] = self.status.name
-        # As text, since a seed may be larger than any of numpy's integers.
-        values["random_state"] = str(self.random_state)
         for name in _MAY_BE_NONE:
             if values[name] is None:
                 del values[name]
-        _check_arrays({name: as_numbers(values[name], name) for name in _ARRAYS & values.keys()})
+        _check_plan({**values, **{n: as_numbers(values[n], n) for n in _ARRAYS & values.keys()}})
+        values["status"] = self.status.name
+        # As text, since a seed may be larger than any of numpy's integers.
+        values["random_state"] = str(self.random_state)
         write_arrays(path, values, format_version=FORMAT_VERSION)
 
     @classmethod
@@ -156,20 +156,23 @@ class PlanResult:
         Raises
         ------
         ValueError
-            If the file is no such file, is truncated, or has another format version.
+            If the file is no such file, is truncated or damaged, has another format version, or
+            holds what does not make a plan.
         """
-        names = {field.name for field in fields(cls)} - _MAY_BE_NONE
-        arrays = read_arrays(path, names, format_version=FORMAT_VERSION, kind="a plan")
+        names = {field.name for field in fields(cls)}
+        required = names - _MAY_BE_NONE
+        arrays = read_arrays(path, required, format_version=FORMAT_VERSION, kind="a plan")
         try:
-            _check_arrays(arrays)
-        except ValueError as error:
+            values: dict[str, Any] = {name: arrays[name] for name in names & arrays.keys()}
+            for name in values.keys() - _ARRAYS:
+                values[name] = arrays[name].item()
+            values["status"] = PlanStatus[values["status"]]
+            values["random_state"] = int(values["random_state"])
+            _check_plan(values)
+        except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{path} is not a whole file of a plan ({error})") from error
-        values: dict[str, Any] = dict.fromkeys(_MAY_BE_NONE) | arrays
-        for name in arrays.keys() - _ARRAYS:
-            values[name] = arrays[name].item()
-        values["status"] = PlanStatus[values["status"]]
-        values["random_state"] = int(values["random_state"])
-        return cls(**values)
+        missing: dict[str, Any] = dict.fromkeys(_MAY_BE_NONE)
+        return cls(**missing | values)
 
     def plot(self, axes: Any = None) -> Any:
         """Draw the search tree with the plan, and the reliability of each transition.
@@ -196,8 +199,23 @@ class PlanResult:
         )
 
 
-def _check_arrays(arrays: dict[str, NDArray[Any]]) -> None:
-    """Raise ``ValueError`` unless arrays are those of one plan."""
+def _check_plan(values: dict[str, Any]) -> None:
+    """Raise ``ValueError`` unless values are those of one plan; what may be None may be missing."""
+    if not isinstance(values["status"], PlanStatus):
+        raise ValueError(f"status must be a PlanStatus, got {values['status']!r}.")
+    if not is_integer(values["random_state"]):
+        raise ValueError(f"random_state must be an integer, got {values['random_state']!r}.")
+    for name in _COUNTS:
+        if not is_integer(values[name]) or values[name] < 0:
+            raise ValueError(f"{name} must be a number of transitions, got {values[name]!r}.")
+    for name in ("planning_time", "simplification_time", "turning"):
+        check_number(values[name], name, 0, np.inf)
+    for name in _MAY_BE_NONE - _ARRAYS & values.keys():
+        check_number(values[name], name, 0, 1)
+    _check_arrays(values)
+
+
+def _check_arrays(arrays: dict[str, Any]) -> None:
     n = arrays["commands"].shape[0] if arrays["commands"].ndim else 0
     expected = {
         "commands": (None, None),
@@ -208,3 +226,6 @@ def _check_arrays(arrays: dict[str, NDArray[Any]]) -> None:
     for name, shape in expected.items():
         if name in arrays:
             as_finite_array(arrays[name], name, shape)
+    if "reliability" in arrays and n:
+        for extreme in (arrays["reliability"].min(), arrays["reliability"].max()):
+            check_number(float(extreme), "reliability", 0, 1)

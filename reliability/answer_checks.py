@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 # By how much rounding may take a probability out of [0, 1].
 ROUNDING = 1e-6
+# By how much half precision may change the sum of a row's probabilities.
+_ROUNDING_OF_SUMS = 0.01
 
 
 def one_per_row(returned: Any, n_rows: int, source: str) -> NDArray[Any]:
@@ -118,5 +120,12 @@ def column_of_probabilities(
     if not fit.all():
         raise ValueError(
             f"{source} must return probabilities between 0 and 1, and returned {table[~fit][0]}."
+        )
+    sums = table.sum(axis=1)
+    adds_up = np.abs(sums - 1) <= _ROUNDING_OF_SUMS
+    if not adds_up.all():
+        raise ValueError(
+            f"{source} must return probabilities that add up to 1, and returned some that add up "
+            f"to {sums[~adds_up][0]:.4g}."
         )
     return probability.clip(0.0, 1.0)

@@ -88,15 +88,20 @@ class ItemFiles:
         if digest != digest_of(rest).encode():
             raise StoreError(f"{file} is damaged: its content does not fit its digest. {_REMEDY}")
         line, _, payload = rest.partition(b"\n")
-        header = json.loads(line)
-        if header["store"] != self.store:
+        try:
+            header = json.loads(line)
+            store, item = header["store"], header["item"]
+            read = Item(dict(header["facts"]), _arrays(header["arrays"], payload))
+        except Exception as error:  # A digest tells damage, and not what wrote the file.
+            raise StoreError(f"{file} is not an item's file ({error!r}). {_REMEDY}") from error
+        if store != self.store:
             raise StoreError(
                 f"{file} belongs to another store, which was made with other arguments than the "
                 f"manifest beside it names. {_REMEDY}"
             )
-        if header["item"] != name:
-            raise StoreError(f"{file} holds {header['item']}, not {name}. {_REMEDY}")
-        return Item(header["facts"], _arrays(header["arrays"], payload))
+        if item != name:
+            raise StoreError(f"{file} holds {item}, not {name}. {_REMEDY}")
+        return read
 
     def write(self, name: str, item: Item) -> None:
         """Write an item, whole or not at all."""

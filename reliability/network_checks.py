@@ -45,8 +45,8 @@ def _backend_of(classifier: TransitionReliabilityClassifier) -> Backend:
         and getattr(function, "__func__", None) is kind.module
         and build.args == (n_features, packed)
         and not build.keywords
+        and inference.rows_per_forward == kind.rows_per_forward
         and type(inference) is _inference_class(kind)
-        and inference.rows_per_forward == backend.rows_per_forward
     )
     if not is_built_here:
         raise ValueError("the weights are of a network that is not one of this library's")

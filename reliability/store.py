@@ -287,7 +287,7 @@ def _read_manifest(file: Path) -> dict[str, Any]:
     try:
         found = dict(json.loads(file.read_bytes()))
         version, digest = found.pop("format_version"), found.pop("digest", None)
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise StoreError(f"{file} is not a manifest ({error!r}). {remedy}") from error
     if version != FORMAT_VERSION:
         raise StoreError(

@@ -295,8 +295,16 @@ class Transitions:
         return cls._of_states(states, first, checked_columns(columns, len(first)))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write one npz file; whatever stood there is replaced only when all is written."""
-        write_arrays(path, self.to_arrays(), format_version=FORMAT_VERSION)
+        """Write one npz file; whatever stood there is replaced only when all is written.
+
+        Raises
+        ------
+        ValueError
+            If a column was replaced by one that does not belong here, which :meth:`load` refuses.
+        """
+        arrays = self.to_arrays()
+        self.from_arrays(arrays)
+        write_arrays(path, arrays, format_version=FORMAT_VERSION)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Transitions:

@@ -50,8 +50,17 @@ class Checkpoint(Callback):
     def on_train_begin(self, net: NeuralNet, **kwargs: Any) -> None:
         """Go on from the file, if there is one."""
         self._check_writable()
-        if self.path.exists():
+        if not self.path.exists():
+            return
+        try:
             self._restore(net, self._read(net.max_epochs))
+        except (ModelFileError, FileNotFoundError):
+            raise
+        except Exception as error:  # Each part of the state has errors of its own.
+            raise ModelFileError(
+                f"{self.path} does not hold the state of a training ({error!r}). Delete it to "
+                "train anew."
+            ) from error
 
     def on_epoch_end(self, net: NeuralNet, **kwargs: Any) -> None:
         """Write the file."""
