@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
+import math
 from enum import Enum
 from pathlib import PurePath
 from typing import Any
@@ -50,6 +51,8 @@ def describe(thing: Any) -> Any:
     ValueError
         If the object neither pickles nor has a method ``describe()``.
     """
+    if isinstance(thing, float) and math.isnan(thing):  # which is not equal to itself
+        return "nan"
     if thing is None or isinstance(thing, bool | int | float | str):
         return thing.value if isinstance(thing, Enum) else thing
     if isinstance(thing, np.longdouble | np.clongdouble):  # whose item is itself

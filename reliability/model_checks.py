@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -176,9 +177,20 @@ def _check_answer(model: Any) -> None:
         raise ValueError(f"{type(model).__name__}.n_features_in_ is {n_features!r}")
     dtype = np.uint8 if getattr(model, "_packed", False) else np.float64
     row: NDArray[Any] = np.zeros((1, int(n_features)), dtype)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # This row has no names.
+        _check_answers_for(model, row)
+
+
+def _check_answers_for(model: Any, row: NDArray[Any]) -> None:
     answer = np.asarray(model.predict(row))
     if answer.shape != (1,) or answer[0] not in model.classes_:
         raise ValueError(f"predict gives {answer!r} for one row")
+    if hasattr(model, "predict_proba") and np.shape(model.predict_proba(row)) != (
+        1,
+        len(model.classes_),
+    ):
+        raise ValueError("predict_proba gives other than one column for each class")
     for method in ("predict_proba", "decision_function"):
         if hasattr(model, method) and not np.isfinite(getattr(model, method)(row)).all():
             raise ValueError(f"{method} gives NaN")

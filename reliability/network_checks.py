@@ -26,6 +26,8 @@ def check_network(classifier: TransitionReliabilityClassifier) -> None:
     ValueError
     """
     inference = classifier._inference
+    if not isinstance(classifier.device, str):
+        raise ValueError(f"device is {classifier.device!r}")
     if type(inference) is not ConstantInference:
         backend = _backend_of(classifier)
         if isinstance(backend, MLP):

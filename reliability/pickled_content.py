@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import types
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -98,6 +98,8 @@ class _Walk:
             return _hash("sequence", *(self.digest(value) for value in thing))
         if isinstance(thing, set | frozenset):
             return _hash("set", *sorted(self.digest(value) for value in thing))
+        if isinstance(thing, np.random.RandomState):  # apart from what it was once seeded with
+            return self._dict("random numbers", thing.get_state(legacy=False))
         if hasattr(thing, "get_tree_stats"):  # scikit-learn's trees of neighbours count their calls
             return _hash("neighbours", *map(self.digest, map(np.asarray, thing.get_arrays())))
         return self._object(thing)
@@ -123,6 +125,8 @@ class _Walk:
         arguments = self.digest(reduced[1])
         items = [self.digest(list(part)) for part in reduced[3:5] if part is not None]
         state = reduced[2] if len(reduced) > 2 else None
+        if isinstance(thing, partial):  # whose attributes are None until somebody looks at them
+            state = (*state[:3], state[3] or None)
         attributes = pickled_state(thing) if _holds_attributes(state) else None
         inner = self.digest(state) if attributes is None else self._dict("state", attributes)
         return _hash("object", type(thing).__qualname__, arguments, inner, *items)

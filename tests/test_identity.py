@@ -10,8 +10,13 @@ import joblib
 import numpy as np
 import pytest
 from sklearn.calibration import CalibratedClassifierCV
-from sklearn.ensemble import HistGradientBoostingClassifier, RandomForestClassifier
+from sklearn.ensemble import (
+    GradientBoostingClassifier,
+    HistGradientBoostingClassifier,
+    RandomForestClassifier,
+)
 from sklearn.linear_model import LogisticRegression
+from sklearn.model_selection import GridSearchCV
 from sklearn.neighbors import KNeighborsClassifier
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -24,6 +29,8 @@ from reliability import (
     TransitionReliabilityClassifier,
     code_digest,
     describe,
+    load_estimator,
+    save_estimator,
 )
 from systems import Car, PlanarArm, Rope, random_car_scene
 
@@ -43,6 +50,8 @@ ESTIMATORS = {
     "calibrated": CalibratedClassifierCV(LogisticRegression(), cv=2),
     "neighbours": KNeighborsClassifier(),
     "support vectors": SVC(),
+    "stages": GradientBoostingClassifier(n_estimators=2, random_state=0),
+    "search": GridSearchCV(LogisticRegression(), {"C": [0.1, 1.0]}, cv=2),
     "ours": TransitionReliabilityClassifier(max_epochs=1, random_state=0),
 }
 
@@ -62,6 +71,16 @@ def test_an_estimator_is_the_same_after_a_file_and_another_with_other_weights(na
     assert json.loads(json.dumps(described)) == described, "fits into a manifest"
     flipped = describe(ESTIMATORS[name].fit(X, 1 - y))
     assert flipped != described
+
+
+@pytest.mark.parametrize("name", ["logistic regression", "stages", "boosting", "search", "ours"])
+def test_an_estimator_is_the_same_after_it_was_saved_without_code(name, data, tmp_path):
+    X, y = data
+    fitted = ESTIMATORS[name].fit(X, y)
+    described = json.dumps(describe(fitted))
+    save_estimator(fitted, tmp_path / "model.skops")
+    assert json.dumps(describe(fitted)) == described, "saving it changes nothing"
+    assert json.dumps(describe(load_estimator(tmp_path / "model.skops"))) == described
 
 
 def test_parameters_are_described_in_words_but_for_those_that_change_no_answer():
