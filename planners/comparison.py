@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from planners.share import draw_share
-from systems.extras import needing
+from reliability.axes import drawing_axes
 
 
 class Comparison:
@@ -102,12 +102,9 @@ class Comparison:
         -------
         axis : matplotlib Axes
         """
-        if axis is None:
-            with needing("examples", "Comparison.plot"):
-                import matplotlib.pyplot as plt
-
-            height = 1.2 + 0.4 * len(self.evaluations)
-            _, axis = plt.subplots(figsize=(6.5, height), layout="constrained")
+        axis = drawing_axes(
+            axis, "Comparison.plot", 1, figsize=(6.5, 1.2 + 0.4 * len(self.evaluations))
+        )
         for row, one in enumerate(self.evaluations.values()):
             draw_share(axis, row, one.success_share, horizontal=True)
         axis.set_yticks(range(len(self.evaluations)), list(self.evaluations))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from planners.comparison import Comparison
 from planners.execution import ExecutionStatus
 from planners.share import Share, draw_share
-from systems.extras import needing
+from reliability.axes import drawing_axes
 from systems.system import Array
 
 _N_BINS = 5
@@ -167,6 +167,11 @@ class Evaluation:
         ValueError
             If they are not of the same problems: of the same ``random_state``, scenes and number.
         """
+        if not isinstance(evaluations, Mapping):
+            raise ValueError(f"evaluations must be a dict, got {evaluations!r}.")
+        for name, one in evaluations.items():
+            if not isinstance(one, Evaluation):
+                raise ValueError(f"evaluations[{name!r}] must be an Evaluation, got {one!r}.")
         return Comparison(dict(evaluations))
 
     def to_dict(self) -> dict[str, Any]:
@@ -248,11 +253,7 @@ class Evaluation:
         -------
         axes : sequence of two matplotlib Axes
         """
-        if axes is None:
-            with needing("examples", "Evaluation.plot"):
-                import matplotlib.pyplot as plt
-
-            _, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
+        axes = drawing_axes(axes, "Evaluation.plot", 2, figsize=(9, 3.2))
         counts = Counter(status.name for status in self.status).most_common()
         names = [name.lower().replace("_", " ") for name, _ in counts]
         colors = ["tab:green" if name == "reached" else "tab:red" for name in names]

@@ -125,7 +125,10 @@ def has_succeeded(system: System, problem: Problem, state: object, tolerance: fl
 def distance_to(region: GoalRegion, configurations: Array) -> Array:
     """Return how far configurations are from a region, after checking what it says."""
     name = f"{type(region).__name__}.distance"
-    return as_array(region.distance(configurations), name, (len(configurations),))
+    distances = as_array(region.distance(configurations), name, (len(configurations),))
+    if np.isnan(distances).any():
+        raise ValueError(f"{name} must return numbers, got NaN.")
+    return distances
 
 
 def trusted(system: System, goals: Array, check: CheckTransition) -> NDArray[np.bool_]:

@@ -50,6 +50,10 @@ class OmplPlanner(ob.Planner):
     def __init__(
         self, space_information: Any, planner: Any, start_reduced: ArrayLike | None
     ) -> None:
+        if not isinstance(space_information, ob.SpaceInformation):
+            raise ValueError(
+                f"space_information must be OMPL's SpaceInformation, got {space_information!r}."
+            )
         super().__init__(space_information, type(planner).__name__)
         self.result: PlanResult | None = None
         self._graph: _Graph | None = None

@@ -404,7 +404,8 @@ class TransitionReliabilityClassifier(
     def _check_checkpoint(self) -> None:
         if self.checkpoint is None:
             return
-        if not isinstance(self.checkpoint, str | os.PathLike):
+        is_path = isinstance(self.checkpoint, str | os.PathLike)
+        if not is_path or "\0" in os.fsdecode(self.checkpoint):
             raise ValueError(f"checkpoint must be the path of a file, got {self.checkpoint!r}.")
         if self.random_state is None:
             raise ValueError(

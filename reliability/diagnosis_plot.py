@@ -6,19 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from reliability.axes import drawing_axes
 from reliability.calibration_curve import N_BINS
-from systems.extras import needing
 
 _SUSPICIOUS, _PLAIN = "tab:red", "tab:blue"
 
 
 def draw_diagnosis(diagnosis: Any, axes: Any = None) -> Any:
     """Draw a diagnosis; see :meth:`Diagnosis.plot`."""
-    if axes is None:
-        with needing("examples", "Diagnosis.plot"):
-            import matplotlib.pyplot as plt
-
-        _, axes = plt.subplots(1, 3, figsize=(13, 3.8), layout="constrained")
+    axes = drawing_axes(axes, "Diagnosis.plot", 3, figsize=(13, 3.8))
     _draw_calibration(diagnosis, axes[0])
     _draw_recalls(diagnosis, axes[1])
     _draw_ranges(diagnosis, axes[2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import math
@@ -128,6 +129,10 @@ def put(target: Path, content: bytes | memoryview, *, replace: bool = True) -> N
     replace : bool, default=True
         False leaves a file that is there already as it is.
     """
+    if target.is_dir():
+        raise IsADirectoryError(
+            errno.EISDIR, "This path is a folder, and must be a file", str(target)
+        )
     partial = target.with_name(f".{target.name}.{uuid.uuid4().hex}{PARTIAL_SUFFIX}")
     try:
         partial.write_bytes(content)
@@ -174,6 +179,8 @@ def _arrays(layouts: list[Any], payload: bytes) -> dict[str, NDArray[Any]]:
     arrays, begin = {}, 0
     for name, kind, shape in layouts:
         count = math.prod(shape)
+        if min(shape, default=0) < 0:
+            raise ValueError(f"{name} has the shape {shape}")
         # A copy can be written to, and is aligned.
         array = np.frombuffer(payload, np.dtype(kind), count, begin).reshape(shape).copy()
         arrays[name] = array

@@ -62,8 +62,8 @@ def model_file(model: Any) -> bytes:
         _check_types(repacked(content))
     except Exception as error:
         raise ValueError(
-            f"{type(model).__name__} can't be saved to a .skops file: {error or repr(error)}. "
-            "Save it with joblib.dump."
+            f"estimator, a {type(model).__name__}, can't be saved to a .skops file: "
+            f"{error or repr(error)}. Save it with joblib.dump."
         ) from error
     return sealed(content)
 

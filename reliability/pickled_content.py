@@ -126,7 +126,7 @@ class _Walk:
         items = [self.digest(list(part)) for part in reduced[3:5] if part is not None]
         state = reduced[2] if len(reduced) > 2 else None
         if isinstance(thing, partial):  # whose attributes are None until somebody looks at them
-            state = (*state[:3], state[3] or None)
+            state = (*reduced[2][:3], reduced[2][3] or None)
         attributes = pickled_state(thing) if _holds_attributes(state) else None
         inner = self.digest(state) if attributes is None else self._dict("state", attributes)
         return _hash("object", type(thing).__qualname__, arguments, inner, *items)

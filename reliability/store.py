@@ -113,7 +113,7 @@ class ResumableStore:
         StoreError
             If the manifest can't be read.
         """
-        found = _read_manifest(Path(folder) / _MANIFEST)
+        found = _read_manifest(as_path(folder) / _MANIFEST)
         return cls(folder, found["kind"], found["description"])
 
     def names(self) -> list[str]:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reliability.advice import label_warnings
+from reliability.axes import drawing_axes
 from reliability.labels import UNRELIABLE
 from reliability.transitions import Transitions
-from systems.extras import needing
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +124,7 @@ class Summary:
         -------
         axes : sequence of two matplotlib Axes
         """
-        if axes is None:
-            with needing("examples", "Summary.plot"):
-                import matplotlib.pyplot as plt
-
-            _, axes = plt.subplots(1, 2, figsize=(9, 3), layout="constrained", sharey=True)
+        axes = drawing_axes(axes, "Summary.plot", 2, figsize=(9, 3), sharey=True)
         most = int(self.transitions_per_plan.max())
         bins = np.linspace(0, most, min(most, 40) + 1)
         axes[0].hist(self.transitions_per_plan, bins, color="tab:blue")

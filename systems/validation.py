@@ -101,6 +101,8 @@ def as_path(value: Any) -> Path:
     """Return a file's or folder's path, or raise ``ValueError`` if a value can't be one."""
     if not isinstance(value, str | os.PathLike) or not os.fspath(value):
         raise ValueError(f"path must be a string or path-like, and not empty, got {value!r}.")
+    if "\0" in os.fsdecode(value):
+        raise ValueError(f"path must not hold a null character, got {value!r}.")
     return Path(value)
 
 

@@ -1,10 +1,13 @@
 """Checkpoints: a killed training goes on to the same end, and no other file is believed."""
 
+import hashlib
+import io
 import pickle
 from copy import copy
 
 import numpy as np
 import pytest
+import torch
 from own_modules import KilledError, Mortal, TwoLayers
 
 from reliability import MLP, ModelFileError, TransitionReliabilityClassifier
@@ -140,6 +143,27 @@ def test_a_truncated_file_is_noticed(path, n_bytes):
     path.write_bytes(path.read_bytes()[:n_bytes])
     with pytest.raises(ModelFileError, match="to train anew"):
         small(MLP((8,)), max_epochs=1, checkpoint=path).fit(X, Y)
+
+
+@pytest.mark.parametrize(
+    "entry",
+    ["identity", "module", "optimizer", "decay", "stop", "history", "generator"],
+)
+@pytest.mark.parametrize("harm", ["missing", "of another kind"])
+def test_a_state_that_no_training_has_is_refused(path, entry, harm):
+    """The digest is right: the file is of another version or author."""
+    small(MLP((8,)), max_epochs=1, checkpoint=path).fit(X, Y)
+    first_line, _, rest = path.read_bytes().partition(b"\n")
+    state = torch.load(io.BytesIO(rest[16:]), weights_only=True)
+    del state[entry]
+    if harm == "of another kind":
+        state[entry] = "?"
+    stream = io.BytesIO()
+    torch.save(state, stream)
+    digest = hashlib.blake2b(stream.getvalue(), digest_size=16).digest()
+    path.write_bytes(first_line + b"\n" + digest + stream.getvalue())
+    with pytest.raises(ModelFileError, match=r"Delete it to train anew|another training"):
+        small(MLP((8,)), max_epochs=2, checkpoint=path).fit(X, Y)
 
 
 def test_a_file_that_cannot_be_written_is_noticed_before_training(tmp_path, monkeypatch):

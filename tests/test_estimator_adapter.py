@@ -137,6 +137,7 @@ HALF = np.full((3, 2), 0.5)
         (np.array([[0.5, 0.5], [-6.0, 7.0], [0, 1]]), "between 0 and 1, and returned -6.0"),
         (np.array([[0.5, 0.5], [0.9, 1.1], [0, 1]]), "between 0 and 1, and returned 1.1"),
         (HALF.astype(str), "must return a column of numbers"),
+        (np.full((3, 2), 0.9), "probabilities that add up to 1, .* add up to 1.8"),
     ],
 )
 def test_what_is_no_probability_is_refused(returned, message):

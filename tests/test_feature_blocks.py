@@ -295,3 +295,11 @@ def test_default_features_keep_what_is_beyond_the_configuration():
     before, after = np.array([[0.5, 1.0, 7.0]]), np.array([[0.5, 0.9, 7.1]])
     expected = [[0.5, 1.0, 7.0, 0.0, -1.0, 1.0]]
     np.testing.assert_allclose(PlainOdometer().features(before, after), expected)
+
+
+def test_a_file_that_mujoco_cannot_read_leaves_no_log_behind(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("absent.xml", "absent"):
+        with pytest.raises(ValueError, match="model_file must be one that MuJoCo can read"):
+            MujocoObstacles(name)([[0.0, 0.0, 0.0]])
+    assert not list(tmp_path.iterdir())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +20,7 @@ from fuzzing import (
     try_numpy_numbers,
     try_odd_values,
 )
+from matplotlib.figure import Figure
 from sklearn.linear_model import LogisticRegression
 from toy_systems import Disc
 
@@ -27,6 +29,7 @@ from planners import (
     BiasedRRTConnect,
     CheckTransition,
     EdgeChecker,
+    Evaluation,
     PlanResult,
     Share,
     SuccessCalibration,
@@ -35,7 +38,7 @@ from planners import (
     execute,
     split_edges,
 )
-from systems import Problem
+from systems import GoalRegion, Problem
 
 DISC = Disc()
 START, GOAL = np.array([-0.9, 0.0]), np.array([[-0.6, 0.3]])
@@ -110,11 +113,98 @@ EVALUATED = {
     "max_replans": 1,
     "random_state": 0,
 }
+EVALUATION = evaluate(**{**EVALUATED, "n_problems": 4})
+DRAWN_ON = Figure().subplots(1, 2)
+paths = choices | st.sampled_from(["file", ".", "file/inside", "new/folder/deep", "\0", "a" * 300])
 PAIR = np.array([[-0.9, 0.0], [-0.6, 0.3]])
 few = st.sampled_from(
     [[], [1], [None], PLANS[:1], PLANS[0], "ab", {}, None, 3, [replace(PLANS[0], reliability=None)]]
 )
+
+
+class Region(GoalRegion):
+    """Goals that are drawn, and their distances, as they are given."""
+
+    def __init__(self, sampled, distance):
+        self.sampled, self.distance_given = sampled, distance
+
+    def sample(self, rng, n):
+        return self.sampled
+
+    def distance(self, configurations):
+        return self.distance_given
+
+
+def reached(sampled, distance):
+    region = Region(sampled, distance)
+    plan = PLANNER.set_params(random_state=0, max_iterations=200).plan(START, region)
+    problem = Problem(START, region)
+    ended = execute(DISC, EVALUATED["planner"], problem, tolerance=0.5)
+    return plan.reduced, ended.commands
+
+
+def in_ompl(space_information, start_reduced):
+    return PLANNER.ompl_planner(space_information, start_reduced).getName()
+
+
+def kept_in(function):
+    def call(path):
+        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+            Path("file").write_bytes(b"")
+            function(path)
+
+    return call
+
+
+def space_information():
+    from ompl import base
+
+    space = base.RealVectorStateSpace(2)
+    space.setBounds(-1, 1)
+    return base.SpaceInformation(space)
+
+
 DOORS = {
+    "GoalRegion": Door(
+        reached,
+        lambda: {"sampled": GOAL.copy(), "distance": np.zeros(1)},
+        {"sampled": rows(1, 2), "distance": rows(1)},
+        names={"sampled": "(sample|goal)", "distance": "(distance|goal)"},
+        share=0.4,
+    ),
+    "ompl_planner": Door(
+        in_ompl,
+        lambda: {"space_information": space_information(), "start_reduced": START},
+        {"space_information": choices, "start_reduced": rows(2)},
+    ),
+    "evaluate (path)": Door(
+        kept_in(lambda path: evaluate(**EVALUATED, path=path)),
+        lambda: {"path": "folder"},
+        {"path": paths},
+        errors=(ValueError, OSError),
+        share=0.2,
+        names={"path": "(path|folder)"},
+    ),
+    "PlanResult.save (path)": Door(
+        kept_in(PLANS[0].save), lambda: {"path": "file"}, {"path": paths}, (ValueError, OSError)
+    ),
+    "Evaluation.plot": Door(
+        lambda **given: str(EVALUATION.plot(**given)),
+        lambda: {"axes": DRAWN_ON},
+        {"axes": choices},
+        share=0.4,
+    ),
+    "Evaluation.compare": Door(
+        lambda **given: str(Evaluation.compare(**given)),
+        lambda: {"evaluations": {"a": EVALUATION, "b": EVALUATION}},
+        {"evaluations": choices | st.sampled_from([{"a": 1}, {"a": None, "b": 2}, [1]])},
+    ),
+    "Comparison.plot": Door(
+        lambda **given: str(Evaluation.compare({"a": EVALUATION}).plot(**given)),
+        lambda: {"axis": DRAWN_ON[0]},
+        {"axis": choices},
+        share=0.4,
+    ),
     "BiasedRRT": planner_door(BiasedRRT),
     "BiasedRRTConnect": planner_door(BiasedRRTConnect, {"transitions_per_edge": 5}.items()),
     "execute": Door(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import tempfile
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from fuzzing import (
     try_numpy_numbers,
     try_odd_values,
 )
+from matplotlib.figure import Figure
 from sklearn.linear_model import LogisticRegression
 from toy_systems import Disc
 
@@ -32,6 +34,7 @@ from reliability import (
     Summary,
     TransitionReliabilityClassifier,
     Transitions,
+    VoxNet,
     code_digest,
     collect_transitions,
     compare_features,
@@ -113,6 +116,25 @@ def file_door(function):
     )
 
 
+def kept_door(argument, function, share=0.4):
+    """A door that writes a file or a folder, some of which can't be."""
+
+    def call(**given):
+        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+            Path("file").write_bytes(b"")
+            function(**given)
+
+    odd = st.sampled_from(["file", ".", "file/inside", "new/folder/deep", "\0", "a" * 300])
+    return Door(
+        call,
+        lambda: {argument: "new.skops"},
+        {argument: choices | odd},
+        (ValueError, OSError),
+        share,
+        {argument: f"({argument}|path|file|whole|manifest)"},
+    )
+
+
 PAIR_OF_PATHS = {"predicted": np.zeros((3, 2)), "executed": np.zeros((2, 2)), "close": DISC.close}
 COLLECTING = {
     "system": DISC,
@@ -157,6 +179,8 @@ TRAINING = {
     "random_state": 1,
 }
 JUDGED = {"estimator": LogisticRegression(), "transitions": MADE, "system": DISC, "cv": 2}
+DIAGNOSIS = diagnose(**JUDGED)
+GRIDS = np.arange(4096 // 8, dtype=np.uint8)
 DOORS = {
     "Transitions": Door(
         transitions,
@@ -263,6 +287,57 @@ DOORS = {
         errors=(ValueError, TypeError, FloatingPointError, OverflowError, OSError),
         share=0.4,
         names=dict.fromkeys(["X", "y"], OF_SKLEARN),
+    ),
+    "VoxNet": Door(
+        lambda X, y, **given: (
+            TransitionReliabilityClassifier(
+                VoxNet(**given), max_epochs=1, validation_fraction=0.0, random_state=0
+            )
+            .fit(X, y)
+            .predict_proba(X)
+        ),
+        lambda: {
+            "X": np.tile(GRIDS, (2, 1)),
+            "y": [0, 1],
+            "pooling": 1,
+            "mixed_precision": True,
+            "augment": False,
+        },
+        {
+            "X": arrays(2, GRIDS.size),
+            **dict.fromkeys(["pooling", "mixed_precision", "augment"], choices | counts),
+        },
+        errors=(ValueError, TypeError, OverflowError),
+        share=0.2,
+        names={"X": OF_SKLEARN},
+    ),
+    "Classifier.fit (checkpoint)": kept_door(
+        "checkpoint",
+        lambda checkpoint: TransitionReliabilityClassifier(
+            MLP((4,)), max_epochs=1, checkpoint=checkpoint, random_state=0
+        ).fit(X, Y),
+    ),
+    "collect_transitions (path)": kept_door(
+        "path", lambda path: collect_transitions(**COLLECTING, path=path)
+    ),
+    "learn_in_rounds (path)": kept_door(
+        "path", lambda path: learn_in_rounds(**LEARNING, path=path), share=0.1
+    ),
+    "ResumableStore (folder)": kept_door("path", lambda path: ResumableStore(path, "a", {})),
+    "ResumableStore.at": kept_door("folder", ResumableStore.at),
+    "Transitions.save (path)": kept_door("path", DATA.save),
+    "save_estimator (path)": kept_door("path", lambda path: save_estimator(CLASSIFIER, path)),
+    "Diagnosis.plot": Door(
+        lambda **given: str(DIAGNOSIS.plot(**given)),
+        lambda: {"axes": Figure().subplots(1, 3)},
+        {"axes": choices},
+        share=0.4,
+    ),
+    "Summary.plot": Door(
+        lambda **given: str(Summary.of(DATA).plot(**given)),
+        lambda: {"axes": Figure().subplots(1, 2)},
+        {"axes": choices},
+        share=0.4,
     ),
     **{
         f"{name}.{method}": Door(

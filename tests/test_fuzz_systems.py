@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +17,7 @@ from fuzzing import (
     counts,
     numbers,
     rows,
+    st,
     try_numpy_numbers,
     try_odd_values,
 )
@@ -29,6 +33,7 @@ from systems import (
     Cylinder,
     CylinderShape,
     MeshShape,
+    MujocoObstacles,
     PlanarArm,
     Rope,
     RopeState,
@@ -38,6 +43,8 @@ from systems import (
     check_system,
     directions,
     from_body_frame,
+    has_slot_and_slit,
+    holding_load,
     load_scene,
     motion_in_body_frame,
     random_car_scene,
@@ -54,6 +61,27 @@ SCENE = ROPE.scene
 HANGING = RopeState(SCENE.start, SCENE.start_rope())
 BAND = ROPE.reduce(HANGING)
 seeds = numbers
+MODEL_FILE = str(Path(tempfile.gettempdir()) / f"fuzzed-{os.getpid()}.xml")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _model_file():
+    Path(MODEL_FILE).write_text(
+        """<mujoco><worldbody>
+          <geom name="wall" type="box" pos="2 0 0" size="0.5 3 1"/>
+          <body><joint name="a" axis="0 1 0"/><geom size="0.1" pos="1 0 0"/>
+          <body><joint name="b" axis="0 1 0"/><geom size="0.1" pos="2 0 0"/></body></body>
+        </worldbody><actuator>
+          <motor joint="a" forcelimited="true" forcerange="-9 9"/>
+          <motor joint="b" forcelimited="true" forcerange="-9 9"/>
+        </actuator></mujoco>"""
+    )
+    yield
+    Path(MODEL_FILE).unlink()
+
+
+def obstacles_at(points, **given):
+    return MujocoObstacles(**given)(points)
 
 
 def of_rows(system, name, first, second, right):
@@ -297,6 +325,33 @@ DOORS = {
         ends=rows(2, 3),
         angular=choices,
     ),
+    "MujocoObstacles": made(
+        obstacles_at,
+        {"model_file": MODEL_FILE, "ignore": (), "height": 0.5, "points": np.ones((2, 2))},
+        model_file=choices,
+        ignore=choices | st.sampled_from([["?"], [None], "wall", ("wall", 1)]),
+        height=numbers,
+        points=rows(2, 2),
+    ),
+    "MujocoObstacles (rays)": made(
+        ray_distances,
+        {
+            "obstacles": MujocoObstacles(MODEL_FILE),
+            "origins": np.zeros((2, 3)),
+            "rays": np.eye(3)[:2],
+            "reach": 2.0,
+        },
+        origins=rows(2, 3),
+        rays=rows(2, 3),
+        reach=numbers,
+    ),
+    "holding_load": made(
+        holding_load,
+        {"model_file": MODEL_FILE, "positions": np.zeros((2, 2))},
+        model_file=choices,
+        positions=rows(2, 2),
+    ),
+    "has_slot_and_slit": made(has_slot_and_slit, {"scene": SCENE}, scene=choices),
     "check_system": Door(
         check_system,
         lambda: {"system": CAR, "random_state": 0},

@@ -335,6 +335,39 @@ def test_results_are_saved_in_one_file(estimator, tmp_path):
         PlanResult.load(path)
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("status", "a"),
+        ("status", [1, 2]),
+        ("random_state", "a"),
+        ("n_checked", -1),
+        ("n_rejected", 0.5),
+        ("n_accepted_unreliable", "a"),
+        ("planning_time", np.nan),
+        ("turning", "a"),
+        ("reliability", np.full(20, 7.0)),
+        ("calibrated_probability", 7.0),
+        ("commands", np.full((20, 2), np.nan)),
+    ],
+)
+def test_a_file_that_holds_no_plan_is_refused(tmp_path, name, value):
+    """Its digest is right: it was written by another version or author."""
+    path = tmp_path / "plan.npz"
+    plan = BiasedRRTConnect(Disc(), HalfPlane(), random_state=0).plan(START, GOAL)
+    plan.save(path)
+    with np.load(path) as archive:
+        arrays = {key: archive[key] for key in archive if key not in ("digest", "format_version")}
+    if name in ("reliability", "commands"):
+        value = value[: len(plan.commands)]
+    write_arrays(path, arrays | {name: np.asarray(value)}, format_version=2)
+    with pytest.raises(ValueError, match=r"plan\.npz is not a whole file of a plan"):
+        PlanResult.load(path)
+    if name not in ("status", "random_state"):
+        with pytest.raises(ValueError, match=name):
+            replace(plan, **{name: value}).save(path)
+
+
 def test_a_seed_of_any_size_is_saved(tmp_path):
     result = BiasedRRT(Disc(), random_state=2**200).plan(START, GOAL)
     result.save(tmp_path / "plan.npz")

@@ -60,6 +60,12 @@ def test_a_plan_without_a_score_is_not_kept():
     assert best_of_restarts(plans.__getitem__, 3).random_state == 1
 
 
+@pytest.mark.parametrize("score", ["good", None, [0.5]])
+def test_a_score_is_a_number(score):
+    with pytest.raises(ValueError, match="score must return a number, got"):
+        best_of_restarts(lambda i: plan_of(0.5, seed=i), 2, score=lambda plan: score)
+
+
 def test_the_score_is_the_callers():
     plans = [plan_of(0.1, 0.9, seed=0), plan_of(0.5, 0.8, seed=1)]
     last = best_of_restarts(plans.__getitem__, 2, score=lambda plan: plan.reliability[-1])
@@ -69,7 +75,10 @@ def test_the_score_is_the_callers():
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
-    [({"n_plans": 0}, "n_plans must be"), ({"n_plans": 2, "enough": "all"}, "enough must be")],
+    [
+        ({"n_plans": 0}, "n_plans must be"),
+        ({"n_plans": 2, "enough": "all"}, "enough must be"),
+    ],
 )
 def test_bad_arguments_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from systems import Box, Capsule, Cylinder
+from systems import Box, Capsule, Cylinder, SceneRenderer, load_scene
 from systems.rope.obstacles.mjcf import geom_xml
 from systems.rope.obstacles.shapes import box_from_ranges, pack_obstacles
 from systems.rope.obstacles.signed_distance import signed_distance
@@ -78,6 +78,41 @@ with SceneRenderer(scene, width=120, height=80, azimuth=220.0) as renderer:
     pictures.append(renderer.render([], goal=False))
 np.save(sys.argv[1], pictures)
 """
+
+
+@pytest.mark.parametrize(
+    ("argument", "value"),
+    [
+        ("scene", None),
+        ("scene", "engine_assembly"),
+        ("width", 0),
+        ("width", 10**6),
+        ("height", -1),
+        ("height", 2.5),
+        ("azimuth", np.nan),
+        ("elevation", "up"),
+    ],
+)
+def test_pictures_that_would_end_the_process_are_refused(argument, value):
+    arguments = {"scene": load_scene("engine_assembly")} | {argument: value}
+    with pytest.raises(ValueError, match=argument):
+        SceneRenderer(**arguments)
+
+
+AFTER_MUJOCO = """
+import mujoco
+from systems import SceneRenderer, load_scene
+
+SceneRenderer(load_scene("engine_assembly"), width=120, height=80)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere MuJoCo draws without being told")
+def test_without_a_display_a_picture_is_refused_in_words(monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL"):
+        monkeypatch.delenv(name, raising=False)
+    done = subprocess.run([sys.executable, "-c", AFTER_MUJOCO], capture_output=True, text=True)
+    assert "Set the environment variable MUJOCO_GL" in done.stderr
 
 
 def test_pictures_show_obstacles_the_rope_and_the_goal(tmp_path):

@@ -1,5 +1,6 @@
 """The store of resumable work: what it keeps, what it notices, and what it says."""
 
+import hashlib
 import json
 import os
 import shutil
@@ -165,7 +166,27 @@ def test_without_its_manifest_a_folder_goes_on_for_the_same_arguments_only(fille
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"{", b"[]", b"3", b"null", b'"text"', b"{}", b"\xff\xfe", b'{"a": 1}']
+    "header",
+    [
+        {},
+        {"store": "a", "item": "item-1", "facts": {}},
+        {"store": "a", "item": "item-1", "facts": 3, "arrays": []},
+        {"store": "a", "item": "item-1", "facts": {}, "arrays": [["rows", "O", [1]]]},
+        {"store": "a", "item": "item-1", "facts": {}, "arrays": [["rows", "<f8", [10**12]]]},
+        {"store": "a", "item": "item-1", "facts": {}, "arrays": [["rows", "<f8", [-1]]]},
+    ],
+)
+def test_a_file_that_no_store_writes_is_noticed(filled, header):
+    """Its digest is right."""
+    rest = json.dumps(header).encode() + b"\n" + bytes(8)
+    digest = hashlib.blake2b(rest, digest_size=16).hexdigest().encode()
+    (filled.folder / "item-1.item").write_bytes(digest + b"\n" + rest)
+    assert "item-1.item is not an item's file" in refused(filled, "item-1")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"{", b"[]", b"3", b"null", b'"text"', b"{}", b"\xff\xfe", b'{"a": 1}', b"[" * 10**5],
 )
 def test_a_bad_manifest_is_named(filled, content):
     file = filled.folder / "manifest.json"

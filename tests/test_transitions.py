@@ -188,6 +188,15 @@ def test_they_say_what_they_are(transitions):
     assert repr(transitions[:0]) == "<Transitions: none, reduced_dim 3>"
 
 
+@pytest.mark.parametrize("y", [[2, 1], ["a", "b"], [0.5, 1.0]])
+def test_what_could_not_be_loaded_is_not_saved(transitions, tmp_path, y):
+    changed = transitions[:2]
+    changed.y = np.array(y)
+    with pytest.raises(ValueError, match="y must"):
+        changed.save(tmp_path / "data.npz")
+    assert not list(tmp_path.iterdir())
+
+
 def test_files_give_back_what_was_saved(transitions, tmp_path):
     transitions.save(tmp_path / "some.npz")
     assert_equal(Transitions.load(tmp_path / "some.npz"), transitions)

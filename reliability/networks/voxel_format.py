@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from systems.validation import is_integer
+
 SIDES = (16, 32, 64)
 MOST_CHANNELS = 7
 # The smallest side of which two convolutions and a pooling layer leave a cell.
@@ -39,7 +41,7 @@ def grid_shape(n_bytes: int) -> tuple[int, int]:
 
 def check_pooling(pooling: Any, side: int | None = None) -> None:
     """Raise ``ValueError`` if pooling is unknown, or leaves too few cells of a grid's side."""
-    if isinstance(pooling, bool) or pooling not in (1, 2, 4):
+    if not is_integer(pooling) or pooling not in (1, 2, 4):
         raise ValueError(f"pooling must be 1, 2 or 4, got {pooling!r}.")
     if side is not None and side // pooling < LEAST_SIDE:
         raise ValueError(

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from systems.features.mujoco_models import thread_model
+from systems.features.mujoco_models import absolute, thread_model
 from systems.validation import as_finite_array
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ def holding_load(model_file: str | os.PathLike[str], positions: ArrayLike) -> Ar
     """
     import mujoco
 
-    file = os.path.abspath(model_file)
+    file = absolute(model_file)
     model, data = thread_model(file)[:2]
     rows = as_finite_array(positions, "positions", (None, model.nq))
     limited, low, high = _limits(file)

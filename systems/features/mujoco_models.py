@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from typing import Any, NamedTuple
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.features.primitive_kernels import PRIMITIVES
+from systems.mujoco_warnings import log_warnings
 
 PROBE_RADIUS = 1e-3
 OBSTACLE_GROUP = 0
@@ -47,6 +49,13 @@ class ModelMemory(NamedTuple):
     radii: NDArray[np.float64]
 
 
+def absolute(model_file: Any) -> str:
+    """Return a model file's absolute path, or raise ``ValueError`` if a value can't be one."""
+    if not isinstance(model_file, str | os.PathLike) or not os.fspath(model_file):
+        raise ValueError(f"model_file must be a string or path-like, got {model_file!r}.")
+    return os.path.abspath(os.fsdecode(model_file))
+
+
 def thread_model(file: str, ignore: tuple[str, ...] = ()) -> ModelMemory:
     """Return the model of a file, read when this thread first asks for it.
 
@@ -74,8 +83,12 @@ def _read(path: str, ignore: tuple[str, ...]) -> ModelMemory:
     import mujoco
 
     # Early versions fill the specification, later ones return a new one.
+    log_warnings()
     spec = mujoco.MjSpec()
-    spec = spec.from_file(path) or spec
+    try:
+        spec = spec.from_file(path) or spec
+    except ValueError as error:
+        raise ValueError(f"model_file must be one that MuJoCo can read: {error}") from error
     probe = spec.worldbody.add_geom()
     probe.name, probe.type = _PROBE, mujoco.mjtGeom.mjGEOM_SPHERE
     # The model may have defaults of its own.

@@ -8,8 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from systems.features.mujoco_models import OBSTACLE_GROUP, PROBE_RADIUS, ModelMemory, thread_model
+from systems.features.mujoco_models import (
+    OBSTACLE_GROUP,
+    PROBE_RADIUS,
+    ModelMemory,
+    absolute,
+    thread_model,
+)
 from systems.features.primitive_kernels import nearest_primitive
+from systems.validation import as_numbers, check_finite
 
 Array = NDArray[np.float64]
 N_GROUPS = 6
@@ -35,7 +42,8 @@ class MujocoObstacles:
     Raises
     ------
     ValueError
-        When it is first called, if MuJoCo can't read the file or knows no geom of an ignored name.
+        If an argument is of the wrong kind. When it is first called, if MuJoCo can't read the file
+        or knows no geom of an ignored name.
 
     Examples
     --------
@@ -56,7 +64,11 @@ class MujocoObstacles:
         ignore: Sequence[str] = (),
         height: float | None = None,
     ) -> None:
-        self.model_file = os.path.abspath(model_file)
+        self.model_file = absolute(model_file)
+        if not isinstance(ignore, list | tuple) or not all(isinstance(n, str) for n in ignore):
+            raise ValueError(f"ignore must be a sequence of names of geoms, got {ignore!r}.")
+        if height is not None:
+            check_finite(height, "height")
         self.ignore = tuple(ignore)
         self.height = height
 
@@ -115,14 +127,16 @@ class MujocoObstacles:
         return np.where(self(origins) <= 0, 0.0, found)
 
     def _in_space(self, points: ArrayLike) -> Array:
-        places = np.asarray(points, dtype=np.float64)
+        places = as_numbers(points, "points")
+        if not np.isfinite(places).all():
+            raise ValueError("points must be finite, got NaN or infinity.")
         width = 3 if self.height is None else 2
         if not places.ndim or places.shape[-1] != width:
             hint = "x, y and z" if width == 3 else "x and y, since a height is given"
             raise ValueError(
                 f"points must have the shape (..., {width}), {hint}, got {places.shape}."
             )
-        return places if self.height is None else _widened(places, self.height)
+        return places if self.height is None else _widened(places, float(self.height))
 
 
 def _widened(points: Array, z: float) -> Array:

@@ -75,6 +75,8 @@ def has_slot_and_slit(scene: Scene) -> bool:
     -------
     has_both : bool
     """
+    if not isinstance(scene, Scene):
+        raise ValueError(f"scene must be a Scene, got {scene!r}.")
     return {"lower slotted wall", "lower wall"} <= {obstacle.name for obstacle in scene.obstacles}
 
 

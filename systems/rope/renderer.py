@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from systems.rope.obstacles.mjcf import geom_xml, numbers_xml
 from systems.rope.obstacles.shapes import Array, Obstacle
 from systems.rope.scene import GRIPPER_RADIUS, ROPE_RADIUS, Scene
+from systems.validation import check_count, check_finite
 
 Color = tuple[float, float, float, float]
 Image = NDArray[np.uint8]
@@ -28,6 +29,8 @@ _OUTER_WALL_COLOR: Color = (0.55, 0.35, 0.75, 0.08)
 _FLOOR_COLOR: Color = (0.75, 0.75, 0.75, 1.0)
 _HOOK_COLOR: Color = (0.05, 0.50, 0.55, 1.0)
 _MAX_GEOMS = 5000
+# MuJoCo ends the process where a picture is larger than the graphics driver's memory for it.
+_MOST_PIXELS = 4096
 
 
 class SceneRenderer:
@@ -42,8 +45,16 @@ class SceneRenderer:
     scene : Scene
     width, height : int
         Pixels.
+        At most 4096.
     azimuth, elevation : float
         Direction of the camera's view, degrees.
+
+    Raises
+    ------
+    ValueError
+        If an argument is of the wrong kind or out of range.
+    RuntimeError
+        If there is no display, and MuJoCo was imported before it was told so.
     """
 
     def __init__(
@@ -55,10 +66,24 @@ class SceneRenderer:
         azimuth: float = 40.0,
         elevation: float = -30.0,
     ) -> None:
-        if sys.platform == "linux" and "DISPLAY" not in os.environ:
+        if not isinstance(scene, Scene):
+            raise ValueError(f"scene must be a Scene, got {scene!r}.")
+        for name, pixels in (("width", width), ("height", height)):
+            check_count(pixels, name)
+            if pixels > _MOST_PIXELS:
+                raise ValueError(f"{name} must be at most {_MOST_PIXELS} pixels, got {pixels}.")
+        check_finite(azimuth, "azimuth")
+        check_finite(elevation, "elevation")
+        width, height = int(width), int(height)
+        if sys.platform == "linux" and not _has_display():
             os.environ.setdefault("MUJOCO_GL", "egl")
         import mujoco
 
+        if sys.platform == "linux" and not _has_display() and "glfw" in mujoco.GLContext.__module__:
+            raise RuntimeError(
+                "MuJoCo was imported before it was told to draw without a display. Set the "
+                "environment variable MUJOCO_GL to egl or osmesa before Python starts."
+            )
         self._scene = scene
         model = mujoco.MjModel.from_xml_string(_model_xml(scene, width, height))
         self._data = mujoco.MjData(model)
@@ -132,6 +157,10 @@ class SceneRenderer:
         )
         scene.ngeom += 1
         return geom
+
+
+def _has_display() -> bool:
+    return "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
 
 
 def _model_xml(scene: Scene, width: int, height: int) -> str:
