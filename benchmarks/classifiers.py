@@ -1,8 +1,8 @@
 """Which classifier to give a planner: our network, with and without its defaults, or boosted trees.
 
 Run as ``python -m benchmarks.classifiers``. On the arm and on the two systems of
-examples/own_systems, each classifier learns from 100, 300 and 1000 executed plans, labelled from
-executed states, and is asked about 300 plans that it has not seen. Planners that ask it, with
+examples/own_systems, each classifier learns from ``--plans`` executed plans, labelled from executed
+states, and is asked about 300 plans that it has not seen. Planners that ask it, with
 k = 10, then solve 100 problems of their own. Everything goes to ``--out``; a run that was
 interrupted goes on where it stopped. Nothing was tuned on these plans and problems.
 """
@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -71,13 +72,14 @@ CLASSIFIERS = {
 def main(arguments: list[str] | None = None) -> None:
     """Collect, train, measure and print two tables."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--plans", type=int, nargs="+", choices=SIZES, default=SIZES)
     parser.add_argument("--problems", type=int, default=100, help="problems per planner")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, default=Path("build/classifiers"))
     options = parser.parse_args(arguments)
     data = {name: collect(name, options) for name in SYSTEMS}
     with threadpool_limits(1, user_api="openmp"):
-        measure_accuracy(data, options.out / "accuracy.json")
+        measure_accuracy(data, options.plans, options.out / "accuracy.json")
         plan(data, options)
 
 
@@ -131,12 +133,14 @@ def some_plans(plans: Transitions, n: int, seed: int) -> Transitions:
     return plans[np.isin(plans.plan, chosen)]
 
 
-def measure_accuracy(data: dict[str, tuple[Transitions, Transitions]], path: Path) -> None:
+def measure_accuracy(
+    data: dict[str, tuple[Transitions, Transitions]], sizes: Sequence[int], path: Path
+) -> None:
     """Print accuracies on plans that no classifier has seen."""
     known = json.loads(path.read_text()) if path.exists() else {}
     columns = ["balanced accuracy", "told - accuracy", "calibration error", "as told"]
     print(f"\n| system | plans | classifier | {' | '.join(columns)} |\n|" + "---|" * 7)
-    for n in SIZES:
+    for n in sizes:
         for system_name, (training, test) in data.items():
             for name in CLASSIFIERS:
                 key = f"{system_name}, {n}, {name}"
@@ -188,7 +192,7 @@ def plan(data: dict[str, tuple[Transitions, Transitions]], options: argparse.Nam
     print("\n| system | plans | classifier | success | solved |\n|" + "---|" * 5)
     for system_name in data:
         report(system_name, 0, "none", None, options)
-    for n in SIZES:
+    for n in options.plans:
         for system_name, (training, _) in data.items():
             for name in CLASSIFIERS:
                 system = SYSTEMS[system_name][0]()

@@ -1,11 +1,11 @@
 """Whether plans are as likely to go well as their ``success_probability`` says.
 
-Run as ``python -m benchmarks.plan_worth --systems arm car tractor load``. For each system, some
-plans are executed to fit :class:`planners.SuccessCalibration`, others to choose ``min_success`` so
-that 80 % and 90 % of the accepted plans succeed, and others again to measure on. It prints a table
-and draws a reliability diagram for each system. With ``--restarts`` it also counts what planning
-again, up to that many times, does for success. Each executed plan is kept in ``--out``, so that a
-run that was interrupted goes on. The car's classifier is the one that ``make car`` trains.
+Run as ``python -m benchmarks.plan_worth``. For each system, some plans are executed to fit
+:class:`planners.SuccessCalibration`, others to choose ``min_success`` so that 80 % and 90 % of the
+accepted plans succeed, and others again to measure on. It prints a table and draws a reliability
+diagram for each system. With ``--restarts`` it also counts what planning again, up to that many
+times, does for success. Each executed plan is kept in ``--out``, so that a run that was interrupted
+goes on. The car's classifier is the one that ``make car`` trains.
 """
 
 from __future__ import annotations

@@ -83,7 +83,7 @@ _RRT = BiasedRRT(None, k=10.0, max_iterations=5000)
 SYSTEMS = {
     "arm": MeasuredSystem(PlanarArm(), _CONNECT, 0.1, 300, (400, 300, 750)),
     "car": MeasuredSystem(_car, _CAR, 0.3, CAR_MODEL, (300, 200, 600)),
-    "rope": MeasuredSystem(_rope, _RRT, 0.025, COLUMNS["vector"], (120, 80, 120)),
+    "rope": MeasuredSystem(_rope, _RRT, 0.025, COLUMNS["vector"], (300, 200, 300)),
     "tractor": MeasuredSystem(TractorTrailer(), _RRT, 0.1, 300, (300, 200, 545)),
     "load": MeasuredSystem(SuspendedLoad(), _CONNECT, 0.3, 300, (500, 400, 700)),
 }
