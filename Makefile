@@ -13,7 +13,7 @@ car: $(ENV)/ready ## no data to the car's tables and pictures, in build/car
 	$(RUN) -m benchmarks.car
 
 test: $(ENV)/ready check ## style, types and tests
-	$(RUN) -m pytest
+	$(RUN) -m pytest -n 2 --dist worksteal
 
 LOWEST := .venv-lowest
 test-lowest: ## with the lowest versions that setup.cfg allows, in an environment of their own
