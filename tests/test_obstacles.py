@@ -3,8 +3,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from systems.rope.obstacles import shapes
-from systems.rope.obstacles.shapes import Box, Capsule, Cylinder, pack_obstacles
+from systems.rope.obstacles import packing
+from systems.rope.obstacles.packing import pack_obstacles
+from systems.rope.obstacles.shapes import Box, Capsule, Cylinder
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.obstacles.signed_distance_kernels import distance_and_gradient
 
@@ -122,14 +123,14 @@ def test_packed_obstacles_have_boxes_first_and_named_columns():
     cylinder = Cylinder((1.0, 2.0, 3.0), 0.1, 0.2, axis=1)
     box = Box((-1.0, -2.0, -3.0), (0.1, 0.2, 0.3))
     packed = pack_obstacles([capsule, cylinder, box])
-    np.testing.assert_array_equal(packed[:, shapes.KIND], [shapes.BOX, shapes.CYLINDER, 2.0])
-    np.testing.assert_array_equal(packed[0, [shapes.X, shapes.Y, shapes.Z]], box.center)
-    half = [shapes.HALF_X, shapes.HALF_Y, shapes.HALF_Z]
+    np.testing.assert_array_equal(packed[:, packing.KIND], [packing.BOX, packing.CYLINDER, 2.0])
+    np.testing.assert_array_equal(packed[0, [packing.X, packing.Y, packing.Z]], box.center)
+    half = [packing.HALF_X, packing.HALF_Y, packing.HALF_Z]
     np.testing.assert_array_equal(packed[0, half], box.half_extents)
-    np.testing.assert_array_equal(packed[1, [shapes.AXIS, shapes.HALF_LENGTH]], [1, 0.2])
-    core = [shapes.CORE_X, shapes.CORE_Y, shapes.CORE_Z]
+    np.testing.assert_array_equal(packed[1, [packing.AXIS, packing.HALF_LENGTH]], [1, 0.2])
+    core = [packing.CORE_X, packing.CORE_Y, packing.CORE_Z]
     np.testing.assert_allclose(packed[2, core], [0.3, 0.4, 0.5])
-    np.testing.assert_array_equal(packed[1:, shapes.RADIUS], [0.1, 0.05])
+    np.testing.assert_array_equal(packed[1:, packing.RADIUS], [0.1, 0.05])
 
 
 def test_points_keep_their_shape():

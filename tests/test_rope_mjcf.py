@@ -9,7 +9,8 @@ import pytest
 
 from systems import Box, Capsule, Cylinder, SceneRenderer, load_scene
 from systems.rope.obstacles.mjcf import geom_xml
-from systems.rope.obstacles.shapes import box_from_ranges, pack_obstacles
+from systems.rope.obstacles.packing import pack_obstacles
+from systems.rope.obstacles.shapes import box_from_ranges
 from systems.rope.obstacles.signed_distance import signed_distance
 
 PROBE_RADIUS = 0.01
