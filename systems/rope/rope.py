@@ -42,6 +42,9 @@ from systems.validation import (
 
 GOAL_DISTANCE = 0.025
 
+# Metres: a rope that was laid over points has slid off if it comes to rest farther from one.
+DRAPED_DISTANCE = 0.05
+
 _MOST_DRAWS = 1000
 
 
@@ -245,14 +248,16 @@ class Rope(System):
         Raises
         ------
         ValueError
-            If the rope does not stay where ``Scene.start_via`` lays it, but slides off.
+            If the rope does not stay where ``Scene.start_via`` lays it: if it comes to rest 0.05 m
+            or more from one of the points, or on another side of an obstacle.
         """
         nodes = self.scene.start_rope()
         state = self._execution.settle(nodes)
         if not self._stays_draped(nodes, state):
             raise ValueError(
-                f"start_via must lay the rope where it stays: in scene {self.scene.name!r} it "
-                "slides off as it comes to rest. Move the points, or the grippers of start."
+                "start_via must be points that the rope stays at: in scene "
+                f"{self.scene.name!r} it slides or falls off as it comes to rest. Give points at "
+                "which it is held, or move the grippers of start."
             )
         return Problem(state, self._goal())
 
@@ -302,7 +307,10 @@ class Rope(System):
 
     def _stays_draped(self, nodes: Array, state: RopeState) -> bool:
         """Say whether a rope that was laid over points still is where they put it, at rest."""
-        if not len(self.scene.start_via):
+        ways = self.scene.start_via[:, None] - state.nodes
+        if (np.linalg.norm(ways, axis=2).min(axis=1) > DRAPED_DISTANCE).any():
+            return False
+        if not len(ways):
             return True
         laid = reduce_rope(nodes, state.grippers, self.scene)
         rested = reduce_rope(state.nodes, state.grippers, self.scene)

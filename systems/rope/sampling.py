@@ -74,17 +74,36 @@ def draw_hanging_rope(scene: Scene, rng: np.random.Generator) -> Array | None:
     -------
     nodes : ndarray of shape (n_nodes, 3), or None
         None if the draw is no such start: too near to the goal, with a gripper on the other one's
-        side, with the rope in an obstacle, or too short. Draw again then.
+        side, or with the rope in an obstacle. Draw again then.
     """
-    grippers = draw_grippers(scene, rng, 1, scene.rope_length).reshape(2, 3)
+    reach = scene.rope_length
+    draped = len(scene.start_via) > 0
+    pair = _draw_draped_pair(scene, rng) if draped else draw_grippers(scene, rng, 1, reach)
+    grippers = pair.reshape(2, 3)
+    if draped and not clear_pairs(scene, pair, reach)[0]:
+        return None
     if scene.way_to_goal(grippers) < LEAST_WAY * scene.way_to_goal(scene.start):
         return None
     to_own_start = np.linalg.norm(grippers - scene.start, axis=1)
     if (to_own_start > np.linalg.norm(grippers - scene.start[::-1], axis=1)).any():
         return None
     n_checks = 1 + _CHECKS_PER_LINK * round(scene.rope_length / NODE_SPACING)
-    if scene.shortest_rope(grippers) > scene.rope_length:
-        return None
     if signed_distance(scene.lay_rope(grippers, n_checks), scene.packed).min() < ROPE_RADIUS:
         return None
     return scene.lay_rope(grippers, scene.n_nodes)
+
+
+def _draw_draped_pair(scene: Scene, rng: np.random.Generator) -> Array:
+    """Draw grippers, shape (1, 6), that a rope over ``start_via`` reaches, clear or not."""
+    on_the_way = np.linalg.norm(np.diff(scene.start_via, axis=0), axis=1).sum()
+    reach, share = scene.rope_length - float(on_the_way), rng.random()
+    a = _draw_near(scene, rng, scene.start_via[0], share * reach)
+    b = _draw_near(scene, rng, scene.start_via[-1], (1.0 - share) * reach)
+    return np.concatenate([a, b])[None]
+
+
+def _draw_near(scene: Scene, rng: np.random.Generator, place: Array, reach: float) -> Array:
+    """Draw a position within bounds, in any direction and no farther from a place than reach."""
+    way = rng.normal(size=3)
+    position = place + reach * rng.random() / np.linalg.norm(way) * way
+    return position.clip(*scene.bounds)

@@ -63,7 +63,8 @@ class Scene:
     start_via : array-like of shape (m, 3), default=()
         Points that the rope's centre line passes at the start, in order from gripper A to B, for
         a rope that is draped over something or lies on it. What the rope is longer than the way
-        over them sags between them.
+        over them sags between them. At rest it has to be within 0.05 m of each, and on the same
+        side of all obstacles.
 
     Raises
     ------
