@@ -291,7 +291,7 @@ DOORS = {
         {
             "obstacles": (),
             "bounds": SCENE.bounds,
-            "rope_length": 2.0,
+            "rope_length": 3.0,
             "start": SCENE.start,
             "goal": np.tile(SCENE.goal, (2, 1, 1)),
             "start_via": np.array([[0.0, 0.1, 0.0], [0.0, -0.1, 0.0]]),

@@ -77,7 +77,10 @@ def capsule_distance(x: float, y: float, z: float, row: Any, bound: float) -> fl
 def sphere_distance(x: float, y: float, z: float, row: Any, bound: float) -> float:
     """Signed distance to a sphere, or ``bound`` if that is smaller."""
     u, v, w = x - row[X], y - row[Y], z - row[Z]
-    return min(bound, np.sqrt(u * u + v * v + w * w) - row[RADIUS])
+    square, reach = u * u + v * v + w * w, bound + row[RADIUS]
+    if reach <= 0.0 or square >= reach * reach:
+        return bound
+    return np.sqrt(square) - row[RADIUS]
 
 
 @compiled
