@@ -12,6 +12,7 @@ from systems.drawing.shapes import Shape
 from systems.goal_region import GoalRegion
 from systems.rope.band.band import bands_close, reduce_rope, reduced_dim
 from systems.rope.band.propagation_kernels import propagate_bands
+from systems.rope.draped_start import stays_draped
 from systems.rope.drawing import drawn_band, drawn_rope, drawn_scene
 from systems.rope.features.registry import FEATURE_NAMES, FEATURES
 from systems.rope.gripper_goal import GripperGoal
@@ -41,9 +42,6 @@ from systems.validation import (
 )
 
 GOAL_DISTANCE = 0.025
-
-# Metres: a rope that was laid over points has slid off if it comes to rest farther from one.
-DRAPED_DISTANCE = 0.05
 
 _MOST_DRAWS = 1000
 
@@ -253,7 +251,7 @@ class Rope(System):
         """
         nodes = self.scene.start_rope()
         state = self._execution.settle(nodes)
-        if not self._stays_draped(nodes, state):
+        if not stays_draped(nodes, state, self.scene):
             raise ValueError(
                 "start_via must be points that the rope stays at: in scene "
                 f"{self.scene.name!r} it slides or falls off as it comes to rest. Give points at "
@@ -277,7 +275,7 @@ class Rope(System):
             if nodes is not None:
                 state = self._execution.settle(nodes)
                 fits = rope_length(state) <= self.scene.max_band_length
-                if fits and self._stays_draped(nodes, state):
+                if fits and stays_draped(nodes, state, self.scene):
                     return Problem(state, self._goal())
         raise ValueError(
             f"scene {self.scene.name!r} has no room for a hanging rope: none of {_MOST_DRAWS} "
@@ -304,17 +302,6 @@ class Rope(System):
 
     def _bands(self, rows: Array) -> Array:
         return np.ascontiguousarray(rows[:, : self._band_dim])
-
-    def _stays_draped(self, nodes: Array, state: RopeState) -> bool:
-        """Say whether a rope that was laid over points still is where they put it, at rest."""
-        ways = self.scene.start_via[:, None] - state.nodes
-        if (np.linalg.norm(ways, axis=2).min(axis=1) > DRAPED_DISTANCE).any():
-            return False
-        if not len(ways):
-            return True
-        laid = reduce_rope(nodes, state.grippers, self.scene)
-        rested = reduce_rope(state.nodes, state.grippers, self.scene)
-        return bool(bands_close(laid[None], rested[None], self.scene)[0])
 
     def _goal(self) -> Array | GoalRegion:
         goal = self.scene.goal
