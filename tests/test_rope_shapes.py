@@ -1,5 +1,7 @@
 """Ropes lowered onto every kind of obstacle, in both engines, do what the reduced model says."""
 
+import itertools
+
 import numpy as np
 import pytest
 from rope_states import pbd_nodes
@@ -7,14 +9,18 @@ from scipy.spatial.transform import Rotation
 
 from systems import (
     Box,
+    BoxShape,
     ConvexPolyhedron,
     Cylinder,
+    CylinderShape,
     Rope,
     RopeStopReason,
     Scene,
     Sphere,
+    SphereShape,
 )
 from systems.rope.band.band import reduced_dim
+from systems.rope.drawing import drawn_scene
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.scene import GRIPPER_RADIUS, ROPE_RADIUS
 
@@ -28,6 +34,7 @@ SHAPES = {
 }
 BOUNDS = [[-1.0] * 3, [1.0] * 3]
 START, GOAL = [[0.0, 0.2, 0.4], [0.0, -0.2, 0.4]], [[0.5, 0.2, 0.4], [0.5, -0.2, 0.4]]
+CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 DOWN = np.tile([0.0, 0.0, -0.0177], 2)
 
 
@@ -82,3 +89,25 @@ def test_grippers_stop_at_the_surface_of_a_shape_in_both_engines_and_in_the_mode
             break
         n_steps += 1
     assert n_steps == pytest.approx(executed.n_completed, abs=1)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_shapes_are_drawn_where_they_are(shape):
+    scene = Scene([SHAPES[shape]], BOUNDS, 0.6, START, GOAL)
+    (drawn,) = drawn_scene(scene)
+    if isinstance(drawn, SphereShape):
+        points = drawn.position + drawn.radius * np.eye(3)
+    elif isinstance(drawn, BoxShape):
+        points = drawn.position + drawn.half_extents * CORNERS @ drawn.rotation.T
+    elif isinstance(drawn, CylinderShape):
+        rim = np.array([[drawn.radius, 0.0, z * drawn.half_length] for z in (-1, 1)])
+        points = drawn.position + rim @ drawn.rotation.T
+    else:
+        points = drawn.vertices
+        corners = drawn.vertices[drawn.faces]
+        first, second, third = corners.swapaxes(0, 1)
+        outward = np.cross(second - first, third - first)
+        assert (np.einsum("nk,nk->n", outward, first - points.mean(axis=0)) > 0).all()
+        # Every side is between two faces, so the surface is closed.
+        assert np.abs(outward.sum(axis=0)).max() < 1e-12
+    np.testing.assert_allclose(signed_distance(points, scene.packed), 0.0, atol=1e-9)
