@@ -26,7 +26,8 @@ def stays_draped(nodes: Array, state: RopeState, scene: Scene) -> bool:
     """
     if not len(scene.start_via):
         return True
-    ways = np.linalg.norm(scene.start_via[:, None] - state.nodes, axis=2)
+    points = np.array(scene.start_via)
+    ways = np.linalg.norm(points[:, None] - state.nodes, axis=2)
     if (ways.min(axis=1) > DRAPED_DISTANCE).any():
         return False
     laid = reduce_rope(nodes, state.grippers, scene)

@@ -97,8 +97,8 @@ def _draw_draped_pair(scene: Scene, rng: np.random.Generator) -> Array:
     """Draw grippers, shape (1, 6), that a rope over ``start_via`` reaches, clear or not."""
     on_the_way = np.linalg.norm(np.diff(scene.start_via, axis=0), axis=1).sum()
     reach, share = scene.rope_length - float(on_the_way), rng.random()
-    a = _draw_near(scene, rng, scene.start_via[0], share * reach)
-    b = _draw_near(scene, rng, scene.start_via[-1], (1.0 - share) * reach)
+    a = _draw_near(scene, rng, np.array(scene.start_via[0]), share * reach)
+    b = _draw_near(scene, rng, np.array(scene.start_via[-1]), (1.0 - share) * reach)
     return np.concatenate([a, b])[None]
 
 

@@ -14,7 +14,7 @@ from systems.rope.catenary import laid_rope
 from systems.rope.gripper_goal import GRIPPERS, GripperGoal
 from systems.rope.obstacles.obstacle import OBSTACLE_KINDS, Obstacle
 from systems.rope.obstacles.packing import pack_obstacles
-from systems.rope.obstacles.shapes import Array
+from systems.rope.obstacles.shapes import Array, Point
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.validation import as_finite_array, as_numbers, check_within_bounds, is_number
 
@@ -84,7 +84,7 @@ class Scene:
     goal: Array | GripperGoal | GoalRegion
     max_stretch: float = MAX_STRETCH
     name: str = "scene"
-    start_via: Array = ()  # type: ignore[assignment]
+    start_via: Sequence[Point] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.obstacles, Sequence):
@@ -94,9 +94,7 @@ class Scene:
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         for field in ("bounds", "start"):
             object.__setattr__(self, field, _frozen_array(getattr(self, field), field, (2, 3)))
-        none = isinstance(self.start_via, list | tuple) and not self.start_via
-        via = np.empty((0, 3)) if none else self.start_via
-        object.__setattr__(self, "start_via", _frozen_array(via, "start_via", (None, 3)))
+        object.__setattr__(self, "start_via", _as_points(self.start_via, "start_via"))
         object.__setattr__(self, "goal", _frozen_goal(self.goal))
         _check_scalars(self)
         for field in ("rope_length", "max_stretch"):
@@ -155,13 +153,20 @@ class Scene:
         return min(float(np.linalg.norm(goal - grippers)) for goal in self.goal.reshape(-1, 2, 3))
 
     def _way(self, grippers: Array) -> Array:
-        return np.concatenate([grippers[:1], self.start_via, grippers[1:]])
+        via = np.reshape(np.array(self.start_via, dtype=np.float64), (-1, 3))
+        return np.concatenate([grippers[:1], via, grippers[1:]])
 
 
 def _frozen_array(values: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Array:
     array = as_finite_array(values, name, shape).copy()
     array.flags.writeable = False
     return array
+
+
+def _as_points(values: ArrayLike, name: str) -> tuple[Point, ...]:
+    if isinstance(values, list | tuple) and not values:
+        return ()
+    return tuple((x, y, z) for x, y, z in as_finite_array(values, name, (None, 3)).tolist())
 
 
 def _frozen_goal(goal: ArrayLike | GripperGoal | GoalRegion) -> Array | GripperGoal | GoalRegion:
