@@ -27,6 +27,7 @@ TITLES = {
     "own_system": "A system of your own",
     "own_simulator": "A system of your own in PyBullet",
     "own_scene": "A rope scene of your own",
+    "rope_shapes": "Shapes, a draped start and a goal for one gripper",
 }
 
 

@@ -20,8 +20,9 @@ GROUPS = {
         "SystemContractError SimulationDivergedError",
         "The arm": "PlanarArm",
         "The car": "Car CarScene Circle ConvexPolygon random_car_scene",
-        "The rope": "Rope RopeState RopeStopReason Scene Box Capsule Cylinder SCENE_NAMES "
-        "load_scene random_rope_scene has_slot_and_slit SceneRenderer ROPE_COLOR BAND_COLOR",
+        "The rope": "Rope RopeState RopeStopReason Scene Box Capsule Cylinder Sphere "
+        "ConvexPolyhedron GripperGoal SCENE_NAMES load_scene random_rope_scene has_slot_and_slit "
+        "SceneRenderer ROPE_COLOR BAND_COLOR",
         "Building blocks for features": "directions shortest_way wrap_columns "
         "motion_in_body_frame to_body_frame from_body_frame MujocoObstacles ray_distances "
         "holding_load",

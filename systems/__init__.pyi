@@ -23,9 +23,12 @@ from .features.mujoco_obstacles import MujocoObstacles as MujocoObstacles
 from .features.ray_distances import ray_distances as ray_distances
 from .goal_region import GoalRegion as GoalRegion
 from .planar_arm.planar_arm import PlanarArm as PlanarArm
+from .rope.gripper_goal import GripperGoal as GripperGoal
+from .rope.obstacles.polyhedron import ConvexPolyhedron as ConvexPolyhedron
 from .rope.obstacles.shapes import Box as Box
 from .rope.obstacles.shapes import Capsule as Capsule
 from .rope.obstacles.shapes import Cylinder as Cylinder
+from .rope.obstacles.shapes import Sphere as Sphere
 from .rope.paper_scenes import SCENE_NAMES as SCENE_NAMES
 from .rope.paper_scenes import load_scene as load_scene
 from .rope.random_scenes import has_slot_and_slit as has_slot_and_slit

@@ -39,9 +39,10 @@ RUNS = {
         {"N_PLANS, N_TESTS": "(200, 40), 3"},
         [r"Kept: the estimator of round \d", r"Without .* in [01] of 3", r"With .* in \d of 3"],
     ),
+    "rope_shapes.py": ({}, ["The system is within the tolerance of the goal"]),
     "rope.py": ({}, [r"Without .* gets caught.*stretch", "With .* passes. Every command was"]),
 }
-PICTURES = {"own_scene.py", "arm.py", "car.py", "rope.py"}
+PICTURES = {"own_scene.py", "arm.py", "car.py", "rope.py", "rope_shapes.py"}
 
 
 def shrunk(code, constants):

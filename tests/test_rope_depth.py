@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from benchmarks.rope.penetration import centre_line, line_depth, main, walk
 from systems import Box, Capsule, Cylinder, Rope, Scene, random_rope_scene
-from systems.rope.obstacles.shapes import pack_obstacles
+from systems.rope.obstacles.packing import pack_obstacles
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.paper_scenes import SCENE_NAMES
 from systems.rope.scene import ROPE_RADIUS

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from systems import Box, Cylinder, RopeState, RopeStopReason, Scene, StopReason
 from systems.errors import SimulationDivergedError
-from systems.rope.obstacles.shapes import pack_obstacles
+from systems.rope.obstacles.packing import pack_obstacles
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.scene import GRIPPER_RADIUS
 from systems.rope.simulation.engines import ENGINES

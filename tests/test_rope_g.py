@@ -21,7 +21,7 @@ from systems.rope.band.band import (
     reduced_dim,
 )
 from systems.rope.catenary import hanging_rope
-from systems.rope.obstacles.shapes import pack_obstacles
+from systems.rope.obstacles.packing import pack_obstacles
 from systems.rope.obstacles.signed_distance import signed_distance
 from systems.rope.scene import GRIPPER_CLEARANCE
 from systems.rope.simulation.state import RopeState

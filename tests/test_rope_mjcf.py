@@ -6,26 +6,42 @@ import sys
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from systems import Box, Capsule, Cylinder, SceneRenderer, load_scene
-from systems.rope.obstacles.mjcf import geom_xml
-from systems.rope.obstacles.shapes import box_from_ranges, pack_obstacles
+from systems import (
+    Box,
+    Capsule,
+    ConvexPolyhedron,
+    Cylinder,
+    SceneRenderer,
+    Sphere,
+    load_scene,
+)
+from systems.rope.obstacles.mjcf import geom_xml, meshes_xml
+from systems.rope.obstacles.packing import pack_obstacles
+from systems.rope.obstacles.shapes import box_from_ranges
 from systems.rope.obstacles.signed_distance import signed_distance
 
 PROBE_RADIUS = 0.01
+TURN = Rotation.from_euler("xyz", (20, 40, 60), degrees=True).as_matrix()
 OBSTACLES = [
     Box((0.1, -0.2, 0.05), (0.1, 0.2, 0.3)),
     Cylinder((0.0, 0.1, -0.1), 0.1, 0.2, 0),
     Cylinder((0.0, 0.1, -0.1), 0.1, 0.2, 1),
     Cylinder((0.0, 0.1, -0.1), 0.1, 0.2, 2),
     Capsule((0.1, 0.1, 0.1), (-0.1, 0.3, -0.2), 0.07),
+    Sphere((0.1, -0.1, 0.05), 0.2),
+    Box((0.1, -0.2, 0.05), (0.1, 0.2, 0.3), rotation=TURN),
+    Cylinder((0.0, 0.1, -0.1), 0.1, 0.2, (0.3, -0.2, 0.5)),
+    ConvexPolyhedron(np.random.default_rng(3).normal(size=(12, 3)) * 0.15),
 ]
 
 
 def in_mujoco(obstacle, points):
     """Distances from points to an obstacle as MuJoCo computes them, with a small sphere."""
     probe = f'<body mocap="true"><geom type="sphere" size="{PROBE_RADIUS}"/></body>'
-    xml = f"<mujoco><worldbody>{geom_xml(obstacle)}{probe}</worldbody></mujoco>"
+    meshes = f"<asset>{meshes_xml([obstacle])}</asset>"
+    xml = f"<mujoco>{meshes}<worldbody>{geom_xml(obstacle)}{probe}</worldbody></mujoco>"
     model = mujoco.MjModel.from_xml_string(xml)
     data = mujoco.MjData(model)
     distances = []

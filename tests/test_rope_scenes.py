@@ -141,7 +141,7 @@ def test_a_slack_rope_hangs_evenly_between_the_grippers(span, length, n_nodes):
         ({"goal": [[0.12, 0.0, 0.0], [0.5, 0.0, 0.0]]}, "goal puts gripper A in collision with"),
         ({"goal": [[0.5, 0.4, 0.0], [0.5, -0.4, 0.0]]}, "goal puts the grippers 0.8 m apart"),
         ({"goal": [[0.5, 0.0, 0.0], [0.5, 0.0, 0.0]]}, "goal puts the grippers 0 m apart"),
-        ({"obstacles": ["pillar"]}, r"obstacles\[0\] must be a Box, a Cylinder or a Capsule"),
+        ({"obstacles": ["pillar"]}, r"obstacles\[0\] must be a Box, Cylinder, Capsule, Sphere"),
     ],
 )
 def test_bad_scenes_are_refused_in_words_that_say_what_to_change(changes, words):

@@ -3,8 +3,18 @@
 import numpy as np
 import pytest
 from rope_states import resample_bands
+from scipy.spatial.transform import Rotation
 
-from systems import Box, Capsule, Cylinder, Rope, Scene, check_system
+from systems import (
+    Box,
+    Capsule,
+    ConvexPolyhedron,
+    Cylinder,
+    Rope,
+    Scene,
+    Sphere,
+    check_system,
+)
 from systems.rope.band.band import reduced_dim
 from systems.rope.features.voxels import unpack_voxels, voxel_features
 from systems.rope.obstacles.signed_distance import signed_distance
@@ -68,10 +78,18 @@ def test_obstacles_of_every_kind_agree_with_slow_ones(rng):
     ends[1] = ends[0] + [0, 0, 0.3]
     capsules = [Capsule(p, q, 0.05) for p, q in ends.reshape(4, 2, 3)]
     box = Box((0.1, 0.2, -0.1), (0.1, 0.02, 0.3))
+    turn = Rotation.from_euler("xyz", (20, 40, 60), degrees=True).as_matrix()
+    tilted = [
+        Box(place, (0.15, 0.1, 0.01), rotation=turn) for place in rng.uniform(-0.4, 0.4, (3, 3))
+    ]
+    poles = [Cylinder(rng.uniform(-0.4, 0.4, 3), 0.03, 0.2, rng.normal(size=3)) for _ in range(3)]
+    ball = Sphere((0.2, -0.3, 0.1), 0.08)
+    wedge = ConvexPolyhedron((-0.2, 0.1, 0.0) + rng.normal(size=(8, 3)) * 0.1)
+    rest = [wedge, ball, *poles, *tilted]
     bounds = np.array([[-0.6, -0.6, -0.6], [0.6, 0.6, 0.9]])
     start = np.array([[-0.1, 0.0, 0.85], [0.1, 0.0, 0.85]])
-    scene = Scene([*capsules, *cylinders, box], bounds, 0.22, start, start)
-    wide = Scene([*capsules, *cylinders, box], bounds, 0.3, start, start, max_stretch=3.0)
+    scene = Scene([*rest, *capsules, *cylinders, box], bounds, 0.22, start, start)
+    wide = Scene([*rest, *capsules, *cylinders, box], bounds, 0.3, start, start, max_stretch=3.0)
     for each in (scene, wide):
         before = random_bands(each, rng, 40)
         after = successors(before, rng)

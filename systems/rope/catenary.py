@@ -1,6 +1,8 @@
-"""The catenary: the curve in which a rope hangs from gripper to gripper."""
+"""The catenary: the curve in which a rope hangs from gripper to gripper, or from point to point."""
 
 from __future__ import annotations
+
+import itertools
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,6 +43,41 @@ def hanging_rope(grippers: ArrayLike, rope_length: float, n_nodes: int) -> Array
     nodes = first + across[:, None] * (last - first)
     nodes[:, 2] = first[2] + height
     nodes[-1] = last
+    return nodes
+
+
+def laid_rope(points: ArrayLike, rope_length: float, n_nodes: int) -> Array:
+    """Lay a rope over points: from each to the next it hangs as in :func:`hanging_rope`.
+
+    Where it is longer than the way over the points, each part is longer by the same factor.
+
+    Parameters
+    ----------
+    points : array-like of shape (m, 3)
+        Gripper A, the points that the rope is laid over, gripper B.
+    rope_length : float
+        Length at rest.
+    n_nodes : int
+
+    Returns
+    -------
+    nodes : ndarray of shape (n_nodes, 3)
+        Evenly spaced along the rope, from gripper A to gripper B.
+    """
+    points = as_finite_array(points, "points", (None, 3))
+    ways = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if len(points) == 2 or not ways.any():
+        return hanging_rope(points[[0, -1]], rope_length, n_nodes)
+    lengths = ways * rope_length / ways.sum()
+    parts = [
+        hanging_rope(pair, length, n_nodes)
+        for pair, length in zip(itertools.pairwise(points), lengths, strict=True)
+    ]
+    curve = np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
+    arc = np.append(0.0, np.linalg.norm(np.diff(curve, axis=0), axis=1).cumsum())
+    places = np.linspace(0.0, arc[-1], n_nodes)
+    nodes = np.column_stack([np.interp(places, arc, column) for column in curve.T])
+    nodes[[0, -1]] = points[[0, -1]]
     return nodes
 
 

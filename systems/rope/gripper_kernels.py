@@ -74,7 +74,7 @@ def allowed_moves(grippers: Any, commands: Any, bounds: Any, packed: Any) -> Any
         Their displacements, metres.
     bounds : ndarray of shape (2, 6)
         Lower and upper limits of the positions.
-    packed : ndarray of shape (n_obstacles, 8)
+    packed : ndarray of shape (n_rows, 8)
 
     Returns
     -------

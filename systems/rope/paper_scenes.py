@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from systems.rope.obstacles.shapes import Box, Capsule, Cylinder, Obstacle, Range, box_from_ranges
+from systems.rope.obstacles.obstacle import Obstacle
+from systems.rope.obstacles.shapes import Box, Capsule, Cylinder, Range, box_from_ranges
 from systems.rope.scene import NODE_SPACING, Scene
 from systems.validation import check_choice
 

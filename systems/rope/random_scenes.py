@@ -18,7 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from systems.rope.obstacles.shapes import Box, Capsule, Cylinder, Obstacle, box_from_ranges
+from systems.rope.obstacles.obstacle import Obstacle
+from systems.rope.obstacles.shapes import Box, Capsule, Cylinder, box_from_ranges
 from systems.rope.scene import NODE_SPACING, Scene
 from systems.validation import RandomState, as_generator
 

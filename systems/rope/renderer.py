@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.rope.obstacles.mjcf import geom_xml, numbers_xml
-from systems.rope.obstacles.shapes import Array, Obstacle
+from systems.rope.gripper_goal import GripperGoal
+from systems.rope.obstacles.mjcf import geom_xml, meshes_xml, numbers_xml
+from systems.rope.obstacles.obstacle import Obstacle
+from systems.rope.obstacles.shapes import Array
 from systems.rope.scene import GRIPPER_RADIUS, ROPE_RADIUS, Scene
 from systems.validation import check_count, check_finite
 
@@ -117,7 +119,7 @@ class SceneRenderer:
         curves : iterable of (ndarray of shape (n, 3), color)
             Centre lines, drawn as thick as the rope.
         goal : bool
-            Whether to show where the grippers should end.
+            Whether to show where the grippers should end; of a ``GoalRegion`` nothing is shown.
 
         Returns
         -------
@@ -129,7 +131,7 @@ class SceneRenderer:
                 self._add_link(start, end, color)
             self._add_spheres((points[0], points[-1]), GRIPPER_COLOR)
         if goal:
-            self._add_spheres(self._scene.goal, _GOAL_COLOR, 1.5 * GRIPPER_RADIUS)
+            self._add_spheres(_goal_places(self._scene), _GOAL_COLOR, 1.5 * GRIPPER_RADIUS)
         image: Image = self._renderer.render()
         return image
 
@@ -163,6 +165,12 @@ def _has_display() -> bool:
     return "DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ
 
 
+def _goal_places(scene: Scene) -> Array:
+    if isinstance(scene.goal, GripperGoal):
+        return np.array([scene.goal.position])
+    return scene.goal.reshape(-1, 3) if isinstance(scene.goal, np.ndarray) else np.empty((0, 3))
+
+
 def _model_xml(scene: Scene, width: int, height: int) -> str:
     geoms = "\n".join(
         geom_xml(obstacle, f'rgba="{numbers_xml(obstacle_color(obstacle))}"')
@@ -179,6 +187,7 @@ def _model_xml(scene: Scene, width: int, height: int) -> str:
   </visual>
   <asset>
     <texture type="skybox" builtin="flat" rgb1="1 1 1" rgb2="1 1 1" width="8" height="8"/>
+    {meshes_xml(scene.obstacles)}
   </asset>
   <worldbody>
     <light pos="0 0 {high[2]}" dir="0.1 0.1 -1" diffuse="0.35 0.35 0.35"/>

@@ -9,10 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from systems.drawing.shapes import Shape
+from systems.goal_region import GoalRegion
 from systems.rope.band.band import bands_close, reduce_rope, reduced_dim
 from systems.rope.band.propagation_kernels import propagate_bands
+from systems.rope.draped_start import stays_draped
 from systems.rope.drawing import drawn_band, drawn_rope, drawn_scene
 from systems.rope.features.registry import FEATURE_NAMES, FEATURES
+from systems.rope.gripper_goal import GripperGoal
+from systems.rope.gripper_goal_region import GripperGoalRegion
 from systems.rope.gripper_kernels import allowed_moves, steer_grippers
 from systems.rope.paper_scenes import SCENE_NAMES, load_scene
 from systems.rope.sampling import draw_grippers, draw_hanging_rope
@@ -237,14 +241,30 @@ class Rope(System):
         return np.reshape(configurations, (-1, 2, 3))
 
     def scene_problem(self) -> Problem:
-        """Return the scene's own start, at rest, and its goal."""
-        return Problem(self._execution.settle(self.scene.start_rope()), self._goal())
+        """Return the scene's own start, at rest, and its goal.
+
+        Raises
+        ------
+        ValueError
+            If the rope does not stay where ``Scene.start_via`` lays it: if it comes to rest 0.05 m
+            or more from one of the points, or on another side of an obstacle.
+        """
+        nodes = self.scene.start_rope()
+        state = self._execution.settle(nodes)
+        if not stays_draped(nodes, state, self.scene):
+            raise ValueError(
+                "start_via must be points that the rope stays at: in scene "
+                f"{self.scene.name!r} it slides or falls off as it comes to rest. Give points at "
+                "which it is held, or move the grippers of start."
+            )
+        return Problem(state, self._goal())
 
     def sample_problem(self, random_state: RandomState = None) -> Problem:
         """Draw a start at which the rope hangs at rest; the goal is the scene's.
 
         Gripper A is uniform in the clear part of the world, and gripper B in what the rope at rest
-        reaches of it. The rope between them hangs free of obstacles, the goal is at least three
+        reaches of it. The rope between them hangs free of obstacles, over the points of
+        ``Scene.start_via`` if there are any, the goal is at least three
         quarters as far away as from the scene's own start, and each gripper is nearer to where it
         starts in the scene than to where the other one does: with both on one side of the
         obstacles, ropes rarely get caught.
@@ -254,7 +274,8 @@ class Rope(System):
             nodes = draw_hanging_rope(self.scene, rng)
             if nodes is not None:
                 state = self._execution.settle(nodes)
-                if rope_length(state) <= self.scene.max_band_length:
+                fits = rope_length(state) <= self.scene.max_band_length
+                if fits and stays_draped(nodes, state, self.scene):
                     return Problem(state, self._goal())
         raise ValueError(
             f"scene {self.scene.name!r} has no room for a hanging rope: none of {_MOST_DRAWS} "
@@ -282,8 +303,11 @@ class Rope(System):
     def _bands(self, rows: Array) -> Array:
         return np.ascontiguousarray(rows[:, : self._band_dim])
 
-    def _goal(self) -> Array:
-        return self.scene.goal.reshape(1, 6).copy()
+    def _goal(self) -> Array | GoalRegion:
+        goal = self.scene.goal
+        if isinstance(goal, GripperGoal):
+            return GripperGoalRegion(goal, self.scene)
+        return goal.reshape(-1, 6).copy() if isinstance(goal, np.ndarray) else goal
 
 
 def _check_state(state: Any) -> None:

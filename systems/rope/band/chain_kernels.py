@@ -114,7 +114,7 @@ def pushed_out(position: Any, clearance: float, packed: Any) -> Point:
     for _ in range(_MAX_PUSHES):
         if d >= clearance:
             break
-        gx, gy, gz = gradient(x, y, z, packed[index])
+        gx, gy, gz = gradient(x, y, z, packed, index)
         step = clearance + _MARGIN - d
         x, y, z = x + step * gx, y + step * gy, z + step * gz
         d, index = nearest_obstacle(x, y, z, packed)

@@ -73,7 +73,7 @@ def compare_bands(bands: Any, others: Any, packed: Any, n_matched: int, max_dist
     Parameters
     ----------
     bands, others : ndarray of shape (n, reduced_dim)
-    packed : ndarray of shape (n_obstacles, 8)
+    packed : ndarray of shape (n_rows, 8)
     n_matched : int
         Points, evenly spaced along each band, that are compared one to one.
     max_distance : float

@@ -129,7 +129,7 @@ def propagate_bands(
         Displacements of gripper A and gripper B, metres.
     allowed : ndarray of bool of shape (n,)
         Commands that are carried out.
-    packed : ndarray of shape (n_obstacles, 8)
+    packed : ndarray of shape (n_rows, 8)
     max_length : float
         Largest length of a band, metres.
 
@@ -161,7 +161,7 @@ def reduce_curve(curve: Any, packed: Any, out: Any) -> int:
     Parameters
     ----------
     curve : ndarray of shape (n, 3)
-    packed : ndarray of shape (n_obstacles, 8)
+    packed : ndarray of shape (n_rows, 8)
     out : ndarray of shape (reduced_dim,)
         The band is written here.
 

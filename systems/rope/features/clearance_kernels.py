@@ -90,7 +90,7 @@ def hanging_clearances(bands: Any, packed: Any, rope_length: float) -> tuple[Any
     Parameters
     ----------
     bands : ndarray of shape (n, reduced_dim)
-    packed : ndarray of shape (n_obstacles, 8)
+    packed : ndarray of shape (n_rows, 8)
     rope_length : float
         At rest, metres.
 
@@ -161,7 +161,7 @@ def pbd_clearances(bands: Any, ropes: Any, n_nodes: int, packed: Any) -> tuple[A
     ropes : ndarray of shape (n, n_ropes, 6 * (n_nodes - 2))
     n_nodes : int
         Nodes of each rope, with both ends.
-    packed : ndarray of shape (n_obstacles, 8)
+    packed : ndarray of shape (n_rows, 8)
 
     Returns
     -------

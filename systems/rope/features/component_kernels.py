@@ -87,7 +87,7 @@ def component_counts(bands: Any, packed: Any, length: float, side: int) -> Any:
     Parameters
     ----------
     bands : ndarray of shape (n, reduced_dim)
-    packed : ndarray of shape (n_obstacles, 8)
+    packed : ndarray of shape (n_rows, 8)
     length : float
         Of the rope that hangs between the grippers, metres.
     side : int

@@ -12,9 +12,10 @@ import numpy as np
 
 from systems.compilation import compiled
 from systems.rope.band.row_kernels import resample_row
-from systems.rope.obstacles.shapes import (
+from systems.rope.obstacles.packing import (
     AXIS,
     BOX,
+    CAPSULE,
     CORE_X,
     CORE_Y,
     CORE_Z,
@@ -29,7 +30,13 @@ from systems.rope.obstacles.shapes import (
     Y,
     Z,
 )
-from systems.rope.obstacles.signed_distance_kernels import EMPTY, capsule_distance
+from systems.rope.obstacles.round_kernels import capsule_distance
+from systems.rope.obstacles.signed_distance_kernels import (
+    EMPTY,
+    radius_around,
+    row_after,
+    seldom_distance,
+)
 
 SIDE = 32
 
@@ -121,17 +128,37 @@ def add_capsule(centers: Any, row: Any, columns: Any) -> None:
 
 
 @compiled
+def add_seldom(centers: Any, packed: Any, index: int, columns: Any) -> None:
+    """Occupy the cells whose centres lie in an obstacle of a kind that few scenes have."""
+    row = packed[index]
+    reach = radius_around(row) * (1.0 + 1e-9)  # Rounding must not lose the cells at its ends.
+    i0, i1 = index_range(centers[0], row[X], reach)
+    j0, j1 = index_range(centers[1], row[Y], reach)
+    k0, k1 = index_range(centers[2], row[Z], reach)
+    for i in range(i0, i1):
+        for j in range(j0, j1):
+            for k in range(k0, k1):
+                x, y, z = centers[0, i], centers[1, j], centers[2, k]
+                if seldom_distance(x, y, z, packed, index, EMPTY) <= 0.0:
+                    columns[i, j] |= _TOP >> np.uint32(k)
+
+
+@compiled
 def fill_surroundings(centers: Any, bounds: Any, packed: Any, columns: Any) -> None:
     """Occupy the cells whose centres are not in free space."""
     fill_outside(centers, bounds, columns)
-    for index in range(packed.shape[0]):
+    index = 0
+    while index < packed.shape[0]:
         row = packed[index]
         if row[KIND] == BOX:
             add_box(centers, row, columns)
         elif row[KIND] == CYLINDER:
             add_cylinder(centers, row, columns)
-        else:
+        elif row[KIND] == CAPSULE:
             add_capsule(centers, row, columns)
+        else:
+            add_seldom(centers, packed, index, columns)
+        index = row_after(packed, index)
 
 
 @compiled
@@ -169,7 +196,7 @@ def voxel_rows(
     Parameters
     ----------
     bands, next_bands : ndarray of shape (n, reduced_dim)
-    packed : ndarray of shape (n_obstacles, 8)
+    packed : ndarray of shape (n_rows, 8)
     bounds : ndarray of shape (2, 3)
         Of the world, metres.
     side : float

@@ -1,40 +1,31 @@
-"""Obstacles of a scene: boxes, cylinders and capsules, in metres in the world frame.
-
-Users describe obstacles by objects. Compiled code reads them as the rows of one table, which
-:func:`pack_obstacles` writes and whose columns are named here.
-"""
+"""Obstacles of a scene that are boxes or round, in metres in the world frame."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from systems.validation import as_finite_array, is_integer, is_number
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]
+Matrix = tuple[Point, Point, Point]
 Range = tuple[float, float]
-
-BOX, CYLINDER, CAPSULE = 0.0, 1.0, 2.0
-
-# Columns of a packed obstacle: its kind and its centre, or the start of a capsule's core segment.
-KIND, X, Y, Z = 0, 1, 2, 3
-HALF_X, HALF_Y, HALF_Z = 4, 5, 6  # of a box: half of the length of each side
-AXIS, HALF_LENGTH = 4, 5  # of a cylinder: the world axis that it runs along
-CORE_X, CORE_Y, CORE_Z = 4, 5, 6  # of a capsule: the vector from start to end
-RADIUS = 7  # of a cylinder or a capsule
-PACKED_WIDTH = 8
 
 # Metres: with sizes beyond these, physics engines fail or lose all accuracy.
 SMALLEST_SIZE, LARGEST_SIZE = 1e-6, 1e6
+UNROTATED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+# How far the product of a rotation matrix with its transpose may be from the identity. Numbers
+# that are no farther off than the second are kept, to the last digit.
+_ROUNDING, _EXACT = 1e-6, 1e-14
 
 
 @dataclass(frozen=True)
 class Box:
-    """An axis-aligned box.
+    """A box, along the world's axes or rotated.
 
     Attributes
     ----------
@@ -43,11 +34,15 @@ class Box:
         Half of the length of each side.
     name : str
         Names the obstacle in messages, and decides its colour in pictures.
+    rotation : array-like of shape (3, 3), default=identity
+        Rotation matrix from the box's frame to the world's: its columns are the directions of the
+        box's sides. ``scipy.spatial.transform.Rotation.as_matrix`` gives one.
     """
 
     center: Point
     half_extents: Point
     name: str = "box"
+    rotation: Matrix = UNROTATED
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", _as_point(self.center, "Box.center"))
@@ -55,33 +50,43 @@ class Box:
         for extent in half_extents:
             _check_positive(extent, "Box.half_extents")
         object.__setattr__(self, "half_extents", half_extents)
+        object.__setattr__(self, "rotation", _as_rotation(self.rotation))
+
+    @property
+    def is_rotated(self) -> bool:
+        """Whether its sides are not along the world's axes."""
+        return self.rotation != UNROTATED
 
 
 @dataclass(frozen=True)
 class Cylinder:
-    """A solid cylinder along one of the world's axes.
+    """A solid cylinder.
 
     Attributes
     ----------
     center : array-like of shape (3,)
     radius, half_length : float
-    axis : {0, 1, 2}
-        The axis it runs along: x, y or z.
+    axis : {0, 1, 2} or array-like of shape (3,), default=2
+        What it runs along: an axis of the world, x, y or z; or a direction of any length.
     name : str
     """
 
     center: Point
     radius: float
     half_length: float
-    axis: int = 2
+    axis: int | Point = 2
     name: str = "cylinder"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", _as_point(self.center, "Cylinder.center"))
         _check_positive(self.radius, "Cylinder.radius")
         _check_positive(self.half_length, "Cylinder.half_length")
-        if not is_integer(self.axis) or self.axis not in (0, 1, 2):
-            raise ValueError(f"Cylinder.axis must be 0 (x), 1 (y) or 2 (z), got {self.axis!r}.")
+        object.__setattr__(self, "axis", _as_axis(self.axis))
+
+    @property
+    def direction(self) -> Array:
+        """The direction it runs along, of length 1, shape (3,)."""
+        return np.eye(3)[self.axis] if isinstance(self.axis, int) else np.array(self.axis)
 
 
 @dataclass(frozen=True)
@@ -111,7 +116,24 @@ class Capsule:
             )
 
 
-Obstacle = Box | Cylinder | Capsule
+@dataclass(frozen=True)
+class Sphere:
+    """All points within ``radius`` of ``center``.
+
+    Attributes
+    ----------
+    center : array-like of shape (3,)
+    radius : float
+    name : str
+    """
+
+    center: Point
+    radius: float
+    name: str = "sphere"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", _as_point(self.center, "Sphere.center"))
+        _check_positive(self.radius, "Sphere.radius")
 
 
 def box_from_ranges(x: Range, y: Range, z: Range, name: str) -> Box:
@@ -120,43 +142,7 @@ def box_from_ranges(x: Range, y: Range, z: Range, name: str) -> Box:
     return Box(tuple(0.5 * (low + high)), tuple(0.5 * (high - low)), name)
 
 
-def pack_obstacles(obstacles: Sequence[Obstacle]) -> Array:
-    """Write obstacles as the rows of a table, for compiled code.
-
-    Parameters
-    ----------
-    obstacles : sequence of Box, Cylinder or Capsule
-
-    Returns
-    -------
-    packed : ndarray of shape (n, 8)
-        Boxes first, then cylinders, then capsules, each in the given order.
-
-    Raises
-    ------
-    ValueError
-        If one of them is no obstacle.
-    """
-    for index, obstacle in enumerate(obstacles):
-        if not isinstance(obstacle, Box | Cylinder | Capsule):
-            raise ValueError(
-                f"obstacles[{index}] must be a Box, a Cylinder or a Capsule, got {obstacle!r}."
-            )
-    rows = sorted((_packed_row(obstacle) for obstacle in obstacles), key=lambda row: row[0])
-    return np.array(rows, dtype=np.float64).reshape(-1, PACKED_WIDTH)
-
-
-def _packed_row(obstacle: Obstacle) -> tuple[float, ...]:
-    if isinstance(obstacle, Box):
-        return (BOX, *obstacle.center, *obstacle.half_extents, 0.0)
-    if isinstance(obstacle, Cylinder):
-        shape = (float(obstacle.axis), obstacle.half_length, 0.0, obstacle.radius)
-        return (CYLINDER, *obstacle.center, *shape)
-    axis = (end - start for start, end in zip(obstacle.start, obstacle.end, strict=True))
-    return (CAPSULE, *obstacle.start, *axis, obstacle.radius)
-
-
-def _as_point(values: Point, name: str) -> Point:
+def _as_point(values: ArrayLike, name: str) -> Point:
     x, y, z = as_finite_array(values, name, (3,)).tolist()
     return (x, y, z)
 
@@ -169,3 +155,38 @@ def _check_positive(value: float, name: str) -> None:
             f"{name} must be positive and finite, from {SMALLEST_SIZE:g} to {LARGEST_SIZE:g} m, "
             f"got {value!r}."
         )
+
+
+def _as_axis(axis: Any) -> int | Point:
+    """Return the number of a world axis, or a direction of length 1."""
+    if not isinstance(axis, list | tuple | np.ndarray):
+        if not is_integer(axis) or axis not in (0, 1, 2):
+            raise ValueError(
+                "Cylinder.axis must be 0 (x), 1 (y) or 2 (z), or a direction of three numbers, "
+                f"got {axis!r}."
+            )
+        return int(axis)
+    direction = as_finite_array(axis, "Cylinder.axis", (3,))
+    largest = np.abs(direction).max()
+    if largest == 0.0:
+        raise ValueError(f"Cylinder.axis must be a direction, whose length is not 0, got {axis!r}.")
+    if abs(np.linalg.norm(direction / largest) * largest - 1.0) > _EXACT:
+        direction = direction / largest  # Squares of huge and tiny numbers can't be represented.
+        direction = direction / np.linalg.norm(direction)
+    return _as_point(direction, "Cylinder.axis")
+
+
+def _as_rotation(rotation: Any) -> Matrix:
+    matrix = as_finite_array(rotation, "Box.rotation", (3, 3))
+    limited = matrix.clip(-2.0, 2.0)
+    error = np.abs(limited.T @ limited - np.eye(3)).max()
+    if error > _ROUNDING or np.linalg.det(limited) < 0.0:
+        raise ValueError(
+            "Box.rotation must be a rotation matrix, of orthogonal columns of length 1 that are "
+            f"right-handed, got {matrix.tolist()}."
+        )
+    if error > _EXACT:
+        left, _, right = np.linalg.svd(matrix)
+        matrix = left @ right  # the nearest matrix that is orthogonal
+    first, second, third = matrix.tolist()
+    return (tuple(first), tuple(second), tuple(third))

@@ -18,8 +18,8 @@ def signed_distance(points: Array, packed: Array) -> Array:
     ----------
     points : ndarray of shape (..., 3)
         Metres, world frame.
-    packed : ndarray of shape (n, 8)
-        From :func:`systems.rope.obstacles.shapes.pack_obstacles`.
+    packed : ndarray of shape (n_rows, 8)
+        From :func:`systems.rope.obstacles.packing.pack_obstacles`.
 
     Returns
     -------

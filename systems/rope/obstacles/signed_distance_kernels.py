@@ -1,7 +1,7 @@
 """Compiled signed distances from points to packed obstacles, and their gradients.
 
 A signed distance is positive outside an obstacle and negative inside. Obstacles are rows of the
-table that :func:`systems.rope.obstacles.shapes.pack_obstacles` writes; lengths are metres.
+table that :func:`systems.rope.obstacles.packing.pack_obstacles` writes; lengths are metres.
 """
 
 from __future__ import annotations
@@ -11,57 +11,80 @@ from typing import Any
 import numpy as np
 
 from systems.compilation import compiled
-from systems.rope.obstacles.shapes import (
-    AXIS,
+from systems.rope.obstacles.box_kernels import (
+    box_gradient,
+    rotated_box_distance,
+    rotated_box_gradient,
+)
+from systems.rope.obstacles.packing import (
     BOX,
-    CORE_X,
-    CORE_Y,
-    CORE_Z,
+    CAPSULE,
     CYLINDER,
-    HALF_LENGTH,
     HALF_X,
     HALF_Y,
     HALF_Z,
     KIND,
+    N_FACES,
+    POLYHEDRON,
     RADIUS,
+    ROTATED_BOX,
+    ROWS_OF_FACE,
+    ROWS_OF_ROTATED_BOX,
+    SLANTED_CYLINDER,
+    SPHERE,
     X,
     Y,
     Z,
+)
+from systems.rope.obstacles.polyhedron_kernels import polyhedron_distance, polyhedron_gradient
+from systems.rope.obstacles.round_kernels import (
+    capsule_distance,
+    capsule_gradient,
+    cylinder_distance,
+    cylinder_gradient,
+    slanted_cylinder_distance,
+    slanted_cylinder_gradient,
+    sphere_distance,
+    sphere_gradient,
 )
 
 EMPTY = 1e9  # the distance, in metres, where there are no obstacles
 
 
 @compiled(inline="always")
-def cylinder_distance(x: float, y: float, z: float, row: Any, bound: float) -> float:
-    """Signed distance to a cylinder along a world axis, or ``bound`` if that is smaller."""
-    u, v, w = x - row[X], y - row[Y], z - row[Z]
-    if row[AXIS] == 0.0:
-        u, v, w = v, w, u
-    elif row[AXIS] == 1.0:
-        u, v, w = u, w, v
-    axial, reach, square = abs(w) - row[HALF_LENGTH], bound + row[RADIUS], u * u + v * v
-    # Most cylinders are too far away to matter: return before taking a square root.
-    if axial >= bound or (reach > 0.0 and square >= reach * reach):
-        return bound
-    radial = np.sqrt(square) - row[RADIUS]
-    if radial <= 0.0 or axial <= 0.0:
-        return max(radial, axial)
-    return np.sqrt(radial * radial + axial * axial)
+def row_after(packed: Any, index: int) -> int:
+    """Return the first row after an obstacle's."""
+    if packed[index, KIND] == ROTATED_BOX:
+        return index + ROWS_OF_ROTATED_BOX
+    if packed[index, KIND] == POLYHEDRON:
+        return index + 1 + ROWS_OF_FACE * int(packed[index, N_FACES])
+    return index + 1
 
 
-@compiled(inline="always")
-def capsule_distance(x: float, y: float, z: float, row: Any, bound: float) -> float:
-    """Signed distance to a capsule, or ``bound`` if that is smaller."""
-    u, v, w = x - row[X], y - row[Y], z - row[Z]
-    along = u * row[CORE_X] + v * row[CORE_Y] + w * row[CORE_Z]
-    along /= row[CORE_X] * row[CORE_X] + row[CORE_Y] * row[CORE_Y] + row[CORE_Z] * row[CORE_Z]
-    along = min(1.0, max(0.0, along))
-    u, v, w = u - along * row[CORE_X], v - along * row[CORE_Y], w - along * row[CORE_Z]
-    square, reach = u * u + v * v + w * w, bound + row[RADIUS]
-    if reach > 0.0 and square >= reach * reach:
-        return bound
-    return np.sqrt(square) - row[RADIUS]
+@compiled
+def radius_around(row: Any) -> float:
+    """Return the radius of a ball, around its centre, that an obstacle that few scenes have is in.
+
+    ``row`` is its first.
+    """
+    if row[KIND] == SPHERE or row[KIND] == POLYHEDRON:
+        return row[RADIUS]
+    # Half of a box's sides, or half of a cylinder's axis.
+    square = row[HALF_X] ** 2 + row[HALF_Y] ** 2 + row[HALF_Z] ** 2
+    return np.sqrt(square + row[RADIUS] ** 2)
+
+
+@compiled
+def seldom_distance(x: float, y: float, z: float, packed: Any, index: int, bound: float) -> float:
+    """Signed distance to an obstacle of a kind that few scenes have, or ``bound`` if smaller."""
+    row = packed[index]
+    if row[KIND] == SLANTED_CYLINDER:
+        return slanted_cylinder_distance(x, y, z, row, bound)
+    if row[KIND] == SPHERE:
+        return sphere_distance(x, y, z, row, bound)
+    if row[KIND] == ROTATED_BOX:
+        return rotated_box_distance(x, y, z, packed, index, bound)
+    return polyhedron_distance(x, y, z, packed, index, bound)
 
 
 @compiled
@@ -88,14 +111,18 @@ def nearest_obstacle(x: float, y: float, z: float, packed: Any) -> tuple[float, 
         if square == 0.0 and max(u, v, w) < depth:
             depth, index = max(u, v, w), i
     distance = np.sqrt(best) + depth
-    for i in range(n_boxes, n):
+    i = n_boxes
+    while i < n:
         row = packed[i]
         if row[KIND] == CYLINDER:
             other = cylinder_distance(x, y, z, row, distance)
-        else:
+        elif row[KIND] == CAPSULE:
             other = capsule_distance(x, y, z, row, distance)
+        else:
+            other = seldom_distance(x, y, z, packed, i, distance)
         if other < distance:
             distance, index = other, i
+        i = row_after(packed, i)
     return distance, index
 
 
@@ -106,69 +133,22 @@ def distance(x: float, y: float, z: float, packed: Any) -> float:
 
 
 @compiled
-def box_gradient(x: float, y: float, z: float, row: Any) -> tuple[float, float, float]:
-    """Gradient of the signed distance to a box."""
-    u, v, w = x - row[X], y - row[Y], z - row[Z]
-    a, b, c = abs(u) - row[HALF_X], abs(v) - row[HALF_Y], abs(w) - row[HALF_Z]
-    su, sv, sw = (1.0 if u >= 0.0 else -1.0), (1.0 if v >= 0.0 else -1.0), (1.0 if w >= 0 else -1.0)
-    if a <= 0.0 and b <= 0.0 and c <= 0.0:
-        if a >= b and a >= c:
-            return su, 0.0, 0.0
-        return (0.0, sv, 0.0) if b >= c else (0.0, 0.0, sw)
-    a, b, c = max(a, 0.0), max(b, 0.0), max(c, 0.0)
-    norm = np.sqrt(a * a + b * b + c * c)
-    return su * a / norm, sv * b / norm, sw * c / norm
-
-
-@compiled
-def cylinder_gradient(x: float, y: float, z: float, row: Any) -> tuple[float, float, float]:
-    """Gradient of the signed distance to a cylinder along a world axis."""
-    u, v, w = x - row[X], y - row[Y], z - row[Z]
-    if row[AXIS] == 0.0:
-        u, v, w = v, w, u
-    elif row[AXIS] == 1.0:
-        u, v, w = u, w, v
-    rho = np.sqrt(u * u + v * v)
-    # On the axis all radial directions are equally near the surface; take the first.
-    e0, e1 = (u / rho, v / rho) if rho > 0.0 else (1.0, 0.0)
-    e2 = 1.0 if w >= 0.0 else -1.0
-    radial, axial = rho - row[RADIUS], abs(w) - row[HALF_LENGTH]
-    if radial <= 0.0 and axial <= 0.0:
-        radial, axial = (1.0, 0.0) if radial >= axial else (0.0, 1.0)
-    radial, axial = max(radial, 0.0), max(axial, 0.0)
-    norm = np.sqrt(radial * radial + axial * axial)
-    e0, e1, e2 = e0 * radial / norm, e1 * radial / norm, e2 * axial / norm
-    if row[AXIS] == 0.0:
-        return e2, e0, e1
-    return (e0, e2, e1) if row[AXIS] == 1.0 else (e0, e1, e2)
-
-
-@compiled
-def capsule_gradient(x: float, y: float, z: float, row: Any) -> tuple[float, float, float]:
-    """Gradient of the signed distance to a capsule."""
-    u, v, w = x - row[X], y - row[Y], z - row[Z]
-    square = row[CORE_X] * row[CORE_X] + row[CORE_Y] * row[CORE_Y] + row[CORE_Z] * row[CORE_Z]
-    along = min(1.0, max(0.0, (u * row[CORE_X] + v * row[CORE_Y] + w * row[CORE_Z]) / square))
-    u, v, w = u - along * row[CORE_X], v - along * row[CORE_Y], w - along * row[CORE_Z]
-    norm = np.sqrt(u * u + v * v + w * w)
-    if norm > 0.0:
-        return u / norm, v / norm, w / norm
-    # On the core segment all directions across it are equally near the surface; take one.
-    if row[CORE_X] * row[CORE_X] < 0.5 * square:
-        norm = np.sqrt(row[CORE_Y] * row[CORE_Y] + row[CORE_Z] * row[CORE_Z])
-        return 0.0, -row[CORE_Z] / norm, row[CORE_Y] / norm
-    norm = np.sqrt(row[CORE_X] * row[CORE_X] + row[CORE_Y] * row[CORE_Y])
-    return -row[CORE_Y] / norm, row[CORE_X] / norm, 0.0
-
-
-@compiled
-def gradient(x: float, y: float, z: float, row: Any) -> tuple[float, float, float]:
-    """Gradient of the signed distance to one obstacle."""
+def gradient(x: float, y: float, z: float, packed: Any, index: int) -> tuple[float, float, float]:
+    """Gradient of the signed distance to the obstacle that begins at a row."""
+    row = packed[index]
     if row[KIND] == BOX:
-        return box_gradient(x, y, z, row)
+        return box_gradient(x - row[X], y - row[Y], z - row[Z], row)
     if row[KIND] == CYLINDER:
         return cylinder_gradient(x, y, z, row)
-    return capsule_gradient(x, y, z, row)
+    if row[KIND] == CAPSULE:
+        return capsule_gradient(x, y, z, row)
+    if row[KIND] == SLANTED_CYLINDER:
+        return slanted_cylinder_gradient(x, y, z, row)
+    if row[KIND] == SPHERE:
+        return sphere_gradient(x, y, z, row)
+    if row[KIND] == ROTATED_BOX:
+        return rotated_box_gradient(x, y, z, packed, index)
+    return polyhedron_gradient(x, y, z, packed, index)
 
 
 @compiled
@@ -179,7 +159,7 @@ def distance_and_gradient(
     d, index = nearest_obstacle(x, y, z, packed)
     if index < 0:
         return d, 0.0, 0.0, 0.0
-    gx, gy, gz = gradient(x, y, z, packed[index])
+    gx, gy, gz = gradient(x, y, z, packed, index)
     return d, gx, gy, gz
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from systems.rope.obstacles.shapes import Array, Obstacle
+from systems.rope.obstacles.obstacle import Obstacle
+from systems.rope.obstacles.shapes import Array
 from systems.rope.simulation.mujoco_engine import MujocoRope
 from systems.rope.simulation.pybullet_engine import PybulletRope
 from systems.rope.simulation.state import RopeState

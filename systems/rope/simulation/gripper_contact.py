@@ -20,7 +20,7 @@ def gripper_clearance(grippers: Array, packed: Array) -> float:
     Parameters
     ----------
     grippers : ndarray of shape (2, 3)
-    packed : ndarray of shape (n_obstacles, 8)
+    packed : ndarray of shape (n_rows, 8)
     """
     return float(signed_distance(grippers, packed).min()) - GRIPPER_RADIUS
 
@@ -32,7 +32,7 @@ def share_without_contact(grippers: Array, move: Array, packed: Array) -> float:
     ----------
     grippers, move : ndarray of shape (2, 3)
         Positions before the move, and displacements, metres.
-    packed : ndarray of shape (n_obstacles, 8)
+    packed : ndarray of shape (n_rows, 8)
     """
     longest = longest_displacement(move)
     if gripper_clearance(grippers, packed) >= longest:

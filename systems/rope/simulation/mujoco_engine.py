@@ -8,8 +8,9 @@ import numpy as np
 
 from systems.errors import SimulationDivergedError
 from systems.mujoco_warnings import log_warnings
-from systems.rope.obstacles.mjcf import geom_xml, numbers_xml
-from systems.rope.obstacles.shapes import Array, Obstacle
+from systems.rope.obstacles.mjcf import geom_xml, meshes_xml, numbers_xml
+from systems.rope.obstacles.obstacle import Obstacle
+from systems.rope.obstacles.shapes import Array
 from systems.rope.scene import ROPE_RADIUS
 from systems.rope.simulation.state import RopeState
 
@@ -35,7 +36,7 @@ class MujocoRope:
 
     Parameters
     ----------
-    obstacles : sequence of Box, Cylinder or Capsule
+    obstacles : sequence of obstacles
     n_nodes : int
     spacing : float
         Metres.
@@ -114,6 +115,7 @@ def _describe(obstacles: Sequence[Obstacle], rest: Array) -> str:
     <mujoco>
       <option timestep="{TIME_STEP}" gravity="0 0 {-GRAVITY}"><flag autoreset="disable"/></option>
       <default><geom contype="1" conaffinity="2" friction="{FRICTION}" {CONTACT}/></default>
+      <asset>{meshes_xml(obstacles)}</asset>
       <worldbody>{"".join(map(geom_xml, obstacles))}{"".join(bodies)}</worldbody>
       <deformable>
         <flex name="rope" dim="1" radius="{ROPE_RADIUS}" body="{" ".join(names)}" element="{edges}">

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from systems.extras import needing
-from systems.rope.obstacles.shapes import Array, Box, Cylinder, Obstacle
+from systems.rope.obstacles.obstacle import Obstacle
+from systems.rope.obstacles.polyhedron import ConvexPolyhedron
+from systems.rope.obstacles.shapes import Array, Box, Cylinder, Sphere
 from systems.rope.scene import ROPE_RADIUS
 from systems.rope.simulation.state import RopeState
 
@@ -47,7 +49,7 @@ class PybulletRope:
 
     Parameters
     ----------
-    obstacles : sequence of Box, Cylinder or Capsule
+    obstacles : sequence of obstacles
     n_nodes : int
     spacing : float
         Metres.
@@ -150,18 +152,8 @@ class PybulletRope:
 
     def _add_obstacle(self, obstacle: Obstacle) -> None:
         bullet, client = self._bullet, self._client
-        if isinstance(obstacle, Box):
-            center, turn = np.array(obstacle.center), UPRIGHT
-            half_extents = [SCALE * extent for extent in obstacle.half_extents]
-            shape = bullet.createCollisionShape(
-                bullet.GEOM_BOX, halfExtents=half_extents, physicsClientId=client
-            )
-        else:
-            center, axis, length, kind = _round_shape(bullet, obstacle)
-            turn = _turns_from_z(axis[None])[0].tolist()
-            shape = bullet.createCollisionShape(
-                kind, radius=SCALE * obstacle.radius, height=SCALE * length, physicsClientId=client
-            )
+        center, turn, size = _collision_shape(bullet, obstacle)
+        shape = bullet.createCollisionShape(**size, physicsClientId=client)
         body = bullet.createMultiBody(
             0.0, shape, self._drawn, (SCALE * center).tolist(), turn, physicsClientId=client
         )
@@ -254,13 +246,40 @@ def _import_pybullet() -> ModuleType:
     return pybullet
 
 
-def _round_shape(bullet: ModuleType, obstacle: Any) -> tuple[Array, Array, float, int]:
+def _collision_shape(
+    bullet: ModuleType, obstacle: Obstacle
+) -> tuple[Array, list[float], dict[str, Any]]:
+    """Return an obstacle's centre, orientation and arguments of ``createCollisionShape``."""
+    if isinstance(obstacle, Box):
+        half_extents = [SCALE * extent for extent in obstacle.half_extents]
+        turn = _turn_of(np.array(obstacle.rotation)) if obstacle.is_rotated else UPRIGHT
+        size = {"shapeType": bullet.GEOM_BOX, "halfExtents": half_extents}
+        return np.array(obstacle.center), turn, size
+    if isinstance(obstacle, ConvexPolyhedron):
+        corners = np.array(obstacle.corners)
+        center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+        vertices = (SCALE * (corners - center)).tolist()
+        return center, UPRIGHT, {"shapeType": bullet.GEOM_MESH, "vertices": vertices}
+    size = {"radius": SCALE * obstacle.radius}
+    if isinstance(obstacle, Sphere):
+        return np.array(obstacle.center), UPRIGHT, {"shapeType": bullet.GEOM_SPHERE, **size}
     if isinstance(obstacle, Cylinder):
-        axis = np.eye(3)[obstacle.axis]
-        return np.array(obstacle.center), axis, 2 * obstacle.half_length, bullet.GEOM_CYLINDER
-    start, end = np.array(obstacle.start), np.array(obstacle.end)
-    length = float(np.linalg.norm(end - start))
-    return (start + end) / 2, (end - start) / length, length, bullet.GEOM_CAPSULE
+        center, axis = np.array(obstacle.center), obstacle.direction
+        length, kind = 2 * obstacle.half_length, bullet.GEOM_CYLINDER
+    else:
+        start, end = np.array(obstacle.start), np.array(obstacle.end)
+        length, kind = float(np.linalg.norm(end - start)), bullet.GEOM_CAPSULE
+        center, axis = (start + end) / 2, (end - start) / length
+    turn = _turns_from_z(axis[None])[0].tolist()
+    return center, turn, {"shapeType": kind, **size, "height": SCALE * length}
+
+
+def _turn_of(rotation: Array) -> list[float]:
+    """Return a rotation matrix as a quaternion x, y, z, w."""
+    from scipy.spatial.transform import Rotation
+
+    turn: list[float] = Rotation.from_matrix(rotation).as_quat().tolist()
+    return turn
 
 
 def _at_rest(nodes: Array) -> Array:

@@ -41,7 +41,7 @@ class PbdModel(NamedTuple):
         Length of a link at rest, metres.
     kinds : ndarray of shape (n_ropes, 2)
         Friction and radius, in metres, of each rope of a row.
-    packed : ndarray of shape (n_obstacles, 8)
+    packed : ndarray of shape (n_rows, 8)
     """
 
     n_nodes: int
@@ -125,7 +125,7 @@ def push_out(lanes: Lanes, i: int, lane: int, friction: float, radius: float, pa
     d, index = nearest_obstacle(x, y, z, packed)
     if d >= radius:
         return d
-    gx, gy, gz = gradient(x, y, z, packed[index])
+    gx, gy, gz = gradient(x, y, z, packed, index)
     depth = radius - d
     x = x + depth * gx - before[i, 0, lane]
     y = y + depth * gy - before[i, 1, lane]
