@@ -16,6 +16,10 @@ ROOT = Path(__file__).parents[1]
 
 
 def run(*command, cwd):
+    return completed(*command, cwd=cwd).stdout
+
+
+def completed(*command, cwd):
     return subprocess.run(
         [sys.executable, *map(str, command)],
         cwd=cwd,
@@ -24,7 +28,7 @@ def run(*command, cwd):
         text=True,
         timeout=1200,
         check=True,
-    ).stdout
+    )
 
 
 def test_arm_example_gives_its_table_and_pictures(tmp_path):
@@ -49,8 +53,9 @@ def test_car_example_gives_its_tables_and_pictures(tmp_path):
     out = tmp_path / "out"
     learning = ("--plans", 15, "--validation", 2, "--rounds", 2)
     size = (*learning, "--scenes", 3, "--test-scenes", 1, "--queries", 1)
-    shown = run("-m", "benchmarks.car", *size, "--jobs", 1, "--out", out, cwd=tmp_path)
-    assert "Round 1:" in shown
+    done = completed("-m", "benchmarks.car", *size, "--jobs", 1, "--out", out, cwd=tmp_path)
+    shown = done.stdout
+    assert "Round 1:" in done.stderr
     assert "Best accuracy that any classifier of b, u and E can have here" in shown
     assert "Random scenes: success is within 0.3" in shown
     results = json.loads((out / "results.json").read_text())

@@ -10,6 +10,7 @@ from typing import Any
 from planners.viewer.arguments import Show, make_show
 from planners.viewer.captions import caption_html
 from planners.viewer.stage import PARTS, Stage, quiet, start_server
+from systems.messages import tell
 from systems.validation import check_flag, is_integer
 
 FRAMES_PER_SECOND = 20
@@ -86,7 +87,7 @@ def show(
     if block is not None:
         check_flag(block, "block")
     viewer = Viewer(make_show(system, plans, executed, goal, names), port)
-    print(f"Open {viewer.url} in a browser to see the plans.")
+    tell(f"Open {viewer.url} in a browser to see the plans.")
     if block or (block is None and not _is_interactive()):
         viewer.wait()
     return viewer

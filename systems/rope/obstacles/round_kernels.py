@@ -22,6 +22,9 @@ from systems.rope.obstacles.packing import (
     Z,
 )
 
+# Metres; what is left of a distance to a core segment below this is rounding, whatever its way.
+_ON_CORE = 1e-12
+
 
 @compiled(inline="always")
 def cylinder_distance(x: float, y: float, z: float, row: Any, bound: float) -> float:
@@ -137,7 +140,7 @@ def capsule_gradient(x: float, y: float, z: float, row: Any) -> tuple[float, flo
     along = min(1.0, max(0.0, (u * row[CORE_X] + v * row[CORE_Y] + w * row[CORE_Z]) / square))
     u, v, w = u - along * row[CORE_X], v - along * row[CORE_Y], w - along * row[CORE_Z]
     norm = np.sqrt(u * u + v * v + w * w)
-    if norm > 0.0:
+    if norm > _ON_CORE:
         return u / norm, v / norm, w / norm
     # On the core segment all directions across it are equally near the surface.
     return across(row[CORE_X], row[CORE_Y], row[CORE_Z])
