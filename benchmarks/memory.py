@@ -1,9 +1,9 @@
 """Whether memory grows with the number of plans that one process makes and executes.
 
 Run as ``python -m benchmarks.memory``. It plans for the arm and for the rope, each plan with
-another seed, with and without a classifier in turn, executes each plan that it finds, and prints the
-memory of the process after each tenth, and by how much it grew over the last eight tenths: the first
-two load and compile.
+another seed, with and without a classifier in turn, and executes each plan that it finds. It prints
+the memory of the process after each tenth, and by how much it grew over the last eight tenths: the
+first two load and compile.
 """
 
 from __future__ import annotations
