@@ -1,7 +1,8 @@
 """Work that is killed or interrupted at random instants is whole when it is run again.
 
 Each test kills many processes, which takes minutes. A server that has imported everything forks
-them, so that kills fall into the work and not into imports.
+them, so that kills fall into the work and not into imports. Work with processes of its own is
+started afresh each time: in what a server forked, multiprocessing waits for joblib's idle workers.
 """
 
 import contextlib
@@ -9,6 +10,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -50,6 +52,13 @@ class Slower(Disc):
 def collect(folder):
     data = collect_transitions(
         Slower(), BiasedRRTConnect(None), 30, random_state=1, path=folder / "data"
+    )
+    return pickle.dumps([data.reduced, data.command, data.y, data.plan])
+
+
+def collect_in_two(folder):
+    data = collect_transitions(
+        Slower(), BiasedRRTConnect(None), 30, n_jobs=2, random_state=1, path=folder / "data"
     )
     return pickle.dumps([data.reduced, data.command, data.y, data.plan])
 
@@ -108,11 +117,34 @@ def run(work, folder):
     (folder / "result").write_bytes(result)
 
 
+class Afresh(subprocess.Popen):
+    """An interpreter that does some work, with what is used here of multiprocessing's Process."""
+
+    def __init__(self, work, folder):
+        code = (
+            f"from pathlib import Path; import test_kills as t; "
+            f"t.run(t.{work.__name__}, Path({str(folder)!r}))"
+        )
+        super().__init__([sys.executable, "-c", code])
+
+    def is_alive(self):
+        return self.poll() is None
+
+    def join(self, timeout):
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.wait(timeout)
+
+    exitcode = property(subprocess.Popen.poll)
+
+
 def started(work, folder):
     """Start a process, and wait until it works."""
     (folder / "started").unlink(missing_ok=True)
-    process = SERVER.Process(target=run, args=(work, folder))
-    process.start()
+    if work is collect_in_two:
+        process = Afresh(work, folder)
+    else:
+        process = SERVER.Process(target=run, args=(work, folder))
+        process.start()
     while not (folder / "started").exists() and process.is_alive():
         time.sleep(0.001)
     return process
@@ -165,7 +197,7 @@ def disturb(work, number, rng, base):
     return codes
 
 
-WORK = {"collect": collect, "train": train}
+WORK = {"collect": collect, "collect-in-two": collect_in_two, "train": train}
 ALONE = {
     "plan": plan,
     "execute-arm": execute_arm,
