@@ -68,9 +68,9 @@ def test_a_viewer_does_not_block_and_closes_cleanly(capsys):
     assert not answers(viewer.url)
     viewer.close()
     assert "closed" in repr(viewer)
-    printed = capsys.readouterr().out
-    assert printed.splitlines()[0] == f"Open {viewer.url} in a browser to see the plans."
-    assert len(printed.splitlines()) == 2
+    told = capsys.readouterr().err
+    assert told.splitlines()[0] == f"Open {viewer.url} in a browser to see the plans."
+    assert len(told.splitlines()) == 2
 
 
 def test_a_script_waits_for_ctrl_c_and_then_goes_on():
@@ -82,8 +82,9 @@ from planners import show
 viewer = show(DISC, PLAN)
 print("went on", viewer)
 """
-    with subprocess.Popen([sys.executable, "-uc", code], stdout=subprocess.PIPE, text=True) as ran:
-        assert ran.stdout.readline().startswith("Open http://127.0.0.1")
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-uc", code], text=True, **pipes) as ran:
+        assert ran.stderr.readline().startswith("Open http://127.0.0.1")
         with pytest.raises(subprocess.TimeoutExpired):
             ran.wait(2)
         ran.send_signal(signal.SIGINT)

@@ -59,7 +59,7 @@ def show(
     Returns
     -------
     viewer : Viewer
-        ``viewer.url`` is the page's address, which is also printed.
+        ``viewer.url`` is the page's address, which also goes to the standard error stream.
 
     Raises
     ------
