@@ -14,13 +14,14 @@ from collections.abc import Callable
 
 import psutil
 
+from benchmarks.shared_steps import ReachingArm
 from planners import BiasedRRT, BiasedRRTConnect
 from reliability import (
     FastHistGradientBoostingClassifier,
     collect_transitions,
     load_pretrained,
 )
-from systems import PlanarArm, Rope, System
+from systems import Rope, System
 
 N_TENTHS, FIRST = 10, 2
 
@@ -38,8 +39,8 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def arm_planner() -> Callable[[int], None]:
-    """Return what plans for the arm, from a random start to a random goal, and executes."""
-    arm = PlanarArm()
+    """Return what plans for the arm, from a random start to a random point, and executes."""
+    arm = ReachingArm()
     data = collect_transitions(arm, BiasedRRTConnect(arm), 100, random_state=0)
     trees = FastHistGradientBoostingClassifier().fit(data.features(arm), data.y)
 
