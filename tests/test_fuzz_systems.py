@@ -360,13 +360,16 @@ DOORS = {
         ends=rows(2, 3),
         angular=choices,
     ),
-    "MujocoObstacles": made(
+    "MujocoObstacles": Door(
         obstacles_at,
-        {"model_file": MODEL_FILE, "ignore": (), "height": 0.5, "points": np.ones((2, 2))},
-        model_file=choices,
-        ignore=choices | st.sampled_from([["?"], [None], "wall", ("wall", 1)]),
-        height=numbers,
-        points=rows(2, 2),
+        lambda: {"model_file": MODEL_FILE, "ignore": (), "height": 0.5, "points": np.ones((2, 2))},
+        {
+            "model_file": choices,
+            "ignore": choices | st.sampled_from([["?"], [None], "wall", ("wall", 1)]),
+            "height": numbers,
+            "points": rows(2, 2),
+        },
+        names={"height": "(height|points)"},  # without a height, points have three numbers
     ),
     "MujocoObstacles (rays)": made(
         ray_distances,
