@@ -3,6 +3,9 @@
 Both start clusters on this machine, and are skipped where they are not installed.
 """
 
+import os
+import sys
+
 import joblib
 import pytest
 from toy_systems import Disc
@@ -44,7 +47,10 @@ def test_ray_collects_the_same_bytes(tmp_path, in_series):
     from ray.util.joblib import register_ray
 
     register_ray()
-    ray.init(num_cpus=2, include_dashboard=False)
+    # Ray's workers do not take over the path that pytest imports from.
+    path = os.pathsep.join(filter(None, sys.path))
+    environment = {"env_vars": {"PYTHONPATH": path}}
+    ray.init(num_cpus=2, include_dashboard=False, runtime_env=environment)
     try:
         with joblib.parallel_config("ray"):
             assert collected(tmp_path / "ray", n_jobs=2) == in_series
