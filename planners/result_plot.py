@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from systems.extras import needing
+from reliability.axes import drawing_axes
 
 _TREE, _PLAN = "0.7", "0.35"
 _COLORS = "RdYlBu"
@@ -14,11 +14,7 @@ _COLORS = "RdYlBu"
 
 def draw_plan(plan: Any, axes: Any = None) -> Any:
     """Draw a plan; see :meth:`PlanResult.plot`."""
-    if axes is None:
-        with needing("examples", "PlanResult.plot"):
-            import matplotlib.pyplot as plt
-
-        _, axes = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
+    axes = drawing_axes(axes, "PlanResult.plot", 2, figsize=(10, 3.8))
     _draw_tree(plan, axes[0])
     _draw_reliability(plan, axes[1])
     return axes

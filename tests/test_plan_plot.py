@@ -54,3 +54,9 @@ def test_it_draws_on_given_axes_and_takes_configurations_of_one_number():
     _, axes = plt.subplots(1, 2)
     assert flat.plot(axes) is axes
     axes[0].figure.canvas.draw()
+
+
+@pytest.mark.parametrize("axes", [3, "two", [1, 2]])
+def test_what_are_not_two_axes_is_refused(axes):
+    with pytest.raises(ValueError, match="axes must be 2 Axes"):
+        PLAN.plot(axes)
