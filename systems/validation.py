@@ -19,6 +19,8 @@ RandomState = None | int | np.random.SeedSequence | np.random.Generator | np.ran
 REAL_KINDS = "biufO"
 # The largest integer of numpy and torch.
 MOST = 2**63 - 1
+# How far the product of a rotation matrix with its transpose may be from the identity.
+_ROUNDING_OF_ROTATIONS = 1e-6
 
 
 def as_generator(random_state: RandomState) -> np.random.Generator:
@@ -91,9 +93,16 @@ def check_finite(value: Any, name: str) -> None:
         raise ValueError(f"{name} must be a finite number, got {value!r}.")
 
 
+def is_number_between(value: Any, low: float, high: float) -> bool:
+    """Say whether a value is a number from ``low`` to ``high``, both included."""
+    # Comparing with a float16 makes the limits float16 too, for which they may be too large.
+    plain = value.item() if isinstance(value, np.generic) else value
+    return is_number(plain) and low <= plain <= high
+
+
 def check_number(value: Any, name: str, low: float, high: float) -> None:
     """Raise ``ValueError`` unless a value is a number from ``low`` to ``high``, both included."""
-    if not is_number(value) or not low <= value <= high:
+    if not is_number_between(value, low, high):
         raise ValueError(f"{name} must be a number between {low} and {high}, got {value!r}.")
 
 
@@ -228,6 +237,26 @@ def as_finite_array(
     if not is_finite(array):
         raise ValueError(f"{name} must be finite, got NaN or infinity in {_shortened(array)}.")
     return array
+
+
+def as_rotation(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    """Return a rotation matrix, exact to a millionth, or raise ``ValueError`` if values are none.
+
+    Parameters
+    ----------
+    values : array-like of shape (3, 3)
+    name : str
+        Names the values in messages.
+    """
+    matrix = as_finite_array(values, name, (3, 3))
+    limited = matrix.clip(-2.0, 2.0)  # Squares of huge numbers can't be represented.
+    error = np.abs(limited.T @ limited - np.eye(3)).max()
+    if error > _ROUNDING_OF_ROTATIONS or np.linalg.det(limited) < 0.0:
+        raise ValueError(
+            f"{name} must be a rotation matrix, of orthogonal columns of length 1 that are "
+            f"right-handed, got {matrix.tolist()}."
+        )
+    return matrix
 
 
 def is_finite(array: NDArray[np.float64]) -> bool:

@@ -99,6 +99,12 @@ def test_truth_is_no_number(truth):
         check_number(truth, "k", 0, 1)
 
 
+def test_limits_may_be_too_large_for_a_numbers_type():
+    check_number(np.float16(2.0), "k", 0.0, 1e9)
+    with pytest.raises(ValueError, match="k must be a number between"):
+        check_number(np.float16(2.0), "k", 3.0, 1e9)
+
+
 def test_arrays_become_float64_and_fitting_ones_stay_themselves():
     array = np.arange(6.0).reshape(2, 3)
     assert as_finite_array(array, "a", (None, 3)) is array

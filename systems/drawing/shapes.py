@@ -7,14 +7,19 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.validation import as_any_array, as_finite_array, is_number
+from systems.validation import (
+    as_any_array,
+    as_finite_array,
+    as_rotation,
+    is_number,
+    is_number_between,
+)
 
 Array = NDArray[np.float64]
 Color = tuple[float, float, float, float]
 
 GREY: Color = (0.72, 0.74, 0.77, 1.0)
 _MOST_METRES = 1e9
-_ORTHONORMAL = 1e-6
 
 
 def _identity() -> Array:
@@ -226,20 +231,13 @@ def _set_array(shape: Shape, name: str, dimensions: tuple[int | None, ...]) -> N
 
 
 def _set_rotation(shape: BoxShape | CylinderShape | MeshShape) -> None:
-    _set_array(shape, "rotation", (3, 3))
-    rotation = shape.rotation
-    off = np.abs(rotation @ rotation.T - np.eye(3)).max()
-    if off > _ORTHONORMAL or np.linalg.det(rotation) < 0:
-        raise ValueError(
-            f"{type(shape).__name__}.rotation must be a rotation matrix, got {rotation.tolist()}."
-        )
+    rotation = as_rotation(shape.rotation, f"{type(shape).__name__}.rotation").copy()
+    object.__setattr__(shape, "rotation", rotation)
 
 
 def _check_size(shape: Shape, name: str) -> None:
     value = getattr(shape, name)
-    # Comparing with a float16 makes the limit float16 too, for which it is too large.
-    plain = value.item() if isinstance(value, np.generic) else value
-    if not is_number(plain) or not 0 < plain <= _MOST_METRES:
+    if not is_number_between(value, 0.0, _MOST_METRES) or value == 0.0:
         raise ValueError(
             f"{type(shape).__name__}.{name} must be positive and at most {_MOST_METRES:g} m, got "
             f"{value!r}."

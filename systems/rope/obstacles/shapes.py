@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from systems.validation import as_finite_array, is_integer, is_number
+from systems.validation import as_finite_array, as_rotation, is_integer, is_number_between
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float]
@@ -18,9 +18,9 @@ Range = tuple[float, float]
 # Metres: with sizes beyond these, physics engines fail or lose all accuracy.
 SMALLEST_SIZE, LARGEST_SIZE = 1e-6, 1e6
 UNROTATED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-# How far the product of a rotation matrix with its transpose may be from the identity. Numbers
-# that are no farther off than the second are kept, to the last digit.
-_ROUNDING, _EXACT = 1e-6, 1e-14
+# Directions of this length, and rotation matrices whose product with their transpose is this near
+# to the identity, are kept to the last digit.
+_EXACT = 1e-14
 
 
 @dataclass(frozen=True)
@@ -148,9 +148,7 @@ def _as_point(values: ArrayLike, name: str) -> Point:
 
 
 def _check_positive(value: float, name: str) -> None:
-    # Comparing with a float16 makes the limits float16 too, of which the larger is too large.
-    plain = value.item() if isinstance(value, np.generic) else value
-    if not is_number(plain) or not SMALLEST_SIZE <= plain <= LARGEST_SIZE:
+    if not is_number_between(value, SMALLEST_SIZE, LARGEST_SIZE):
         raise ValueError(
             f"{name} must be positive and finite, from {SMALLEST_SIZE:g} to {LARGEST_SIZE:g} m, "
             f"got {value!r}."
@@ -177,14 +175,8 @@ def _as_axis(axis: Any) -> int | Point:
 
 
 def _as_rotation(rotation: Any) -> Matrix:
-    matrix = as_finite_array(rotation, "Box.rotation", (3, 3))
-    limited = matrix.clip(-2.0, 2.0)
-    error = np.abs(limited.T @ limited - np.eye(3)).max()
-    if error > _ROUNDING or np.linalg.det(limited) < 0.0:
-        raise ValueError(
-            "Box.rotation must be a rotation matrix, of orthogonal columns of length 1 that are "
-            f"right-handed, got {matrix.tolist()}."
-        )
+    matrix = as_rotation(rotation, "Box.rotation")
+    error = np.abs(matrix.T @ matrix - np.eye(3)).max()
     if error > _EXACT:
         left, _, right = np.linalg.svd(matrix)
         matrix = left @ right  # the nearest matrix that is orthogonal
