@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from systems.drawing.rings import ring_faces
 from systems.system import Array
 
 _N_SIDES = 10
@@ -22,12 +23,7 @@ def quaternion(rotation: Array) -> Array:
 
 def tube_faces(n_points: int) -> NDArray[np.int64]:
     """Return the triangles of a tube along ``n_points`` points, (m, 3), for any such tube."""
-    n_rings = n_points + 2 * _N_END_RINGS
-    ring, side = np.meshgrid(np.arange(n_rings - 1), np.arange(_N_SIDES), indexing="ij")
-    here, right = ring * _N_SIDES + side, ring * _N_SIDES + (side + 1) % _N_SIDES
-    above, above_right = here + _N_SIDES, right + _N_SIDES
-    faces = [np.stack([here, right, above_right], axis=2), np.stack([here, above_right, above], 2)]
-    return np.concatenate([part.reshape(-1, 3) for part in faces])
+    return ring_faces(n_points + 2 * _N_END_RINGS, _N_SIDES)
 
 
 def tube_vertices(points: Array, radius: float) -> Array:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from systems.drawing.rings import ring_faces
 from systems.drawing.shapes import (
     BoxShape,
     Color,
@@ -101,12 +102,4 @@ def _unit_ball(n_around: int = 24, n_up: int = 12) -> tuple[np.ndarray, np.ndarr
         ],
         axis=2,
     )
-    ring, place = np.meshgrid(np.arange(n_up), np.arange(n_around), indexing="ij")
-    here, right = ring * n_around + place, ring * n_around + (place + 1) % n_around
-    faces = np.concatenate(
-        [
-            np.stack([here, right, right + n_around], axis=2).reshape(-1, 3),
-            np.stack([here, right + n_around, here + n_around], axis=2).reshape(-1, 3),
-        ]
-    )
-    return rings.reshape(-1, 3), faces
+    return rings.reshape(-1, 3), ring_faces(n_up + 1, n_around)
