@@ -71,6 +71,23 @@ def test_a_callback_can_end_the_training(data):
     assert recorder.told[-1] == "torn down"
 
 
+class Impatient(Recorder):
+    """Presses Ctrl-C when the last epoch ends."""
+
+    def on_fit_task_end(self, estimator, context):
+        self.told.append(f"{context.task_name} ends")
+        if context.task_name == "epoch" and self.told.count("epoch ends") == 3:
+            raise KeyboardInterrupt
+
+
+def test_control_c_in_the_last_epochs_callbacks_is_not_swallowed(data):
+    X, y, weight = data
+    impatient = Impatient()
+    with pytest.raises(KeyboardInterrupt):
+        network().set_callbacks(impatient).fit(X, y, sample_weight=weight)
+    assert impatient.told[-1] == "torn down"
+
+
 def test_callbacks_clean_up_after_a_failure(data):
     X, y, weight = data
     recorder = Recorder()

@@ -3,8 +3,10 @@
 import re
 import signal
 import sqlite3
+import threading
 from pathlib import Path
 from subprocess import CalledProcessError
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -547,3 +549,34 @@ def test_what_ompl_cannot_do_from_python():
     for call in (planner.params, planner.getSpecs):
         with pytest.raises(TypeError, match="Unable to convert function return value"):
             call()
+
+
+@pytest.mark.parametrize("at_seeding", [1, 2, 3])
+def test_a_plan_interrupted_while_seeds_are_set_or_put_back_does_not_block_the_next(
+    monkeypatch, at_seeding
+):
+    class InterruptedRNG(ou.RNG):
+        n_seedings = 0
+
+        @staticmethod
+        def setSeed(seed):  # noqa: N802
+            InterruptedRNG.n_seedings += 1
+            if InterruptedRNG.n_seedings == at_seeding:
+                raise KeyboardInterrupt
+            ou.RNG.setSeed(seed)
+
+    def plan():
+        return BiasedRRTConnect(Disc(), random_state=0).plan(START, GOAL)
+
+    expected = plan()
+    with monkeypatch.context() as patch:
+        stand_in = SimpleNamespace(**{**vars(ou), "RNG": InterruptedRNG})
+        patch.setattr("planners.ompl_globals.ou", stand_in)
+        with pytest.raises(KeyboardInterrupt):
+            plan()
+    plans = []
+    thread = threading.Thread(target=lambda: plans.append(plan()), daemon=True)
+    thread.start()
+    thread.join(60)
+    assert not thread.is_alive(), "it waits for ever"
+    assert_same_plan(plans[0], expected)
