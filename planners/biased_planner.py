@@ -167,7 +167,8 @@ class BiasedPlanner(DocumentationLink, BaseEstimator):
     ) -> PlanResult:
         began = time.perf_counter()
         progress = Progress(type(self).__name__, bool(self.verbose))
-        budget = Budget(int(self.max_iterations), time_limit, terminated, progress.advance)
+        advanced = progress.advance if self.verbose else None
+        budget = Budget(int(self.max_iterations), time_limit, terminated, advanced)
         search = self._build(seed, starts, goal, budget)
         with _one_thread(search.check):
             with progress.searching(search.check, int(self.max_iterations)):
